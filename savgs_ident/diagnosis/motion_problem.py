@@ -83,7 +83,7 @@ class MotionProblem(AbstractProblem):
     @cached_property
     def samples(self) -> Samples:
         """The motion as the equations take it."""
-        return samples_of(self.motion)
+        return samples_of(self.motion, self.plant)
 
     def start(self, values: Mapping[str, float]) -> None:
         """Nothing: the motion is known."""

@@ -2,7 +2,7 @@
 
 A plant without a catalogue has every law at every port that it suits, with typical sizes from the port:
 
-    effects = generic_effects(plant.ports)
+    effects = generic_effects(plant.scaled_ports)
 
 Such an effect is named after its port and its law: ``suspension_viscous``. At a number port there is one for each
 number: ``inertia_m_s_offset``.

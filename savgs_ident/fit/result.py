@@ -18,6 +18,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.fit.identified import Identified
 from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
+from savgs_ident.responses.programmes import driven_alike, settings_of
 
 
 @dataclass(frozen=True)
@@ -247,6 +248,7 @@ class MeasuredPoints:
         phase_sd: of its phase [rad], (D, C).
         peak_to_peak: [unit], (D, C).
         peak_to_peak_sd: [unit], (D, C).
+        programme: number of the line that each dwell is on, (D,).
     """
 
     frequency: NDArray[np.float64]
@@ -255,6 +257,7 @@ class MeasuredPoints:
     phase_sd: NDArray[np.float64]
     peak_to_peak: NDArray[np.float64]
     peak_to_peak_sd: NDArray[np.float64]
+    programme: NDArray[np.intp]
 
 
 def measured_points(response: HarmonicResponse, channels: Sequence[str], driven_by: str) -> MeasuredPoints:
@@ -274,7 +277,10 @@ def measured_points(response: HarmonicResponse, channels: Sequence[str], driven_
         magnitude_sd[d, column] = _deviation(covariance, along) / np.abs(drive[d])
         phase_sd[d, column] = _deviation(covariance, 1j * along) / np.abs(first)
         span[d, column], span_sd[d, column] = response.peak_to_peak[d, c], response.peak_to_peak_sd[d, c]
-    return MeasuredPoints(response.frequency, transfer, magnitude_sd, phase_sd, span, span_sd)
+    others = [name for name in response.channels if name not in (driven_by, *channels)]
+    levels = [response.harmonics[:, response.channel(name), 0] for name in others]
+    lines = driven_alike(response.frequency, settings_of(drive, levels))
+    return MeasuredPoints(response.frequency, transfer, magnitude_sd, phase_sd, span, span_sd, lines)
 
 
 def _deviation(covariance: NDArray[np.float64], direction: NDArray[np.complex128]) -> NDArray[np.float64]:

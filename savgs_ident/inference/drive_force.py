@@ -43,7 +43,7 @@ class ForceRows(NamedTuple):
 
 def force_rows(model: AbstractPlant, p: Values, motion: DrivenMotion, names: Sequence[str]) -> ForceRows:
     """The force that a model needs along a motion with parameters ``p`` [SI], with slopes in those named."""
-    p, samples = placed(dict(p)), samples_of(motion)
+    p, samples = placed(dict(p)), samples_of(motion, model)
     if names:
         directions = placed(unit_tangents(p, names, ceil(len(names) / WIDTH) * WIDTH))
         wanted = placed(np.asarray(len(names)))

@@ -138,7 +138,8 @@ class MotionQuestion:
         return {
             "position": motion.position,
             "drive": motion.drive,
-            **motion.beside,
+            "time_scale": motion.time_scale,
+            **{f"beside {name}": each for name, each in motion.beside.items()},
             "step": motion.step,
             "noise": motion.noise,
         }

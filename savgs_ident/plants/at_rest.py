@@ -24,7 +24,7 @@ NO_STIFFNESS = 1e-12
 
 
 ALONG = 1e-9
-"""Change of what is out of balance, over all of it, that is none [1]: what rounding leaves."""
+"""Change of what is out of balance in an equation, over that, that is none [1]: what rounding leaves."""
 
 
 class Rest(NamedTuple):
@@ -85,7 +85,8 @@ def carried_along(plant: AbstractPlant, p: Values) -> tuple[bool, ...]:
         *(each.acceleration_size for each in bare.coordinates),
     ]
     q, qd, qdd = np.split(somewhere[: 3 * n] * sizes, 3)
-    s, sd = (jnp.asarray(each) for each in np.split(somewhere[3 * n : 3 * n + 2 * count], 2))
+    scales = np.array([float(state.scale) for state in bare.states])
+    s, sd = (jnp.asarray(each * scales) for each in np.split(somewhere[3 * n : 3 * n + 2 * count], 2))
     levels = somewhere[-2 * len(bare.inputs) :]
 
     def balance(place: int, shift: float) -> NDArray[np.float64]:
@@ -99,7 +100,7 @@ def carried_along(plant: AbstractPlant, p: Values) -> tuple[bool, ...]:
 
     def along(place: int) -> bool:
         known, shifted = balance(place, 0.0), balance(place, input_size(bare, bare.inputs[place]))
-        return bool(np.all(np.abs(shifted - known) <= ALONG * np.max(np.abs(known))))
+        return bool(np.all(np.abs(shifted - known) <= ALONG * np.abs(known)))
 
     return tuple(along(place) for place in range(len(bare.inputs)))
 

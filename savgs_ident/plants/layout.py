@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.base import AbstractPlant, scale_of_time
 from savgs_ident.recordings.checks_signal import DataLocation
-from savgs_ident.recordings.recording import ChannelSpec, Recording, RecordingLayout
+from savgs_ident.recordings.recording import SLOWEST_HZ, ChannelSpec, Recording, RecordingLayout
 from savgs_ident.responses.resolution import roughness
 
 
@@ -25,6 +25,7 @@ def layout_of(plant: AbstractPlant | type[AbstractPlant]) -> RecordingLayout:
             partial(check_sizes, _typical_sizes(plant)),
             partial(check_inputs, tuple(each.name for each in plant.inputs if each.required)),
         ),
+        slowest_hz=SLOWEST_HZ / max(scale_of_time(plant), 1.0),
     )
 
 

@@ -20,7 +20,7 @@ from savgs_ident.core.parameter import SIZED, TYPICAL, Parameter, ParameterTable
 from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect, generic_effects
-from savgs_ident.plants.base import AbstractPlant, Channel
+from savgs_ident.plants.base import AbstractPlant, Channel, scale_of_time
 from savgs_ident.plants.layout import layout_of
 from savgs_ident.plants.time_scale import time_scale_of
 from savgs_ident.recordings.recording import Campaign, RecordingLayout
@@ -160,6 +160,7 @@ class PlantModel:
             effect = self.catalogue[effect]
         if effect.name in self.effects:
             return self
+        effect = effect.sized(replace(effect.port, time_scale=scale_of_time(self.plant)))
         catalogue = {**self.catalogue, effect.name: effect}
         return replace(self, plant=self.plant + effect, catalogue=catalogue)
 

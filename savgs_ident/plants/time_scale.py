@@ -4,12 +4,13 @@ Windows of roads and sweeps, nodes of motions and lags of laws are given in seco
 as a quarter car does: its body at 1 Hz, its wheel at 10 Hz. A small mechanism may be ten times as fast, a tall
 building ten times as slow. A plant's *time scale* [1] says by what its times are multiplied, and its frequencies
 divided: 1 where its fastest natural frequency lies between :data:`SLOWEST_HZ` and :data:`FASTEST_HZ`, else the power
-of two that brings it there, a slow one beyond :data:`SLOW_HZ`. A power of two, because the frequency that a plant is
-declared with is not the one that is fitted, and a program is compiled for each scale.
+of two that brings it there, a slow one beyond :data:`SLOW_HZ`; a fast one no further than its slowest natural
+frequency stays above :data:`BODY_HZ`, for a stiff part must not hide what swings slowly. A power of two, because the
+frequency that a plant is declared with is not the one that is fitted, and a program is compiled for each scale.
 """
 
 from collections.abc import Mapping
-from math import ceil, log2
+from math import ceil, floor, log2
 
 import equinox as eqx
 import jax
@@ -29,6 +30,10 @@ SLOWEST_HZ = 1.5
 """Below this the fastest natural frequency [Hz] is that of a slower one. Origin: a seat swings at 1.5 to 3 Hz, and
 windows that suit a quarter car still suit it."""
 
+BODY_HZ = 0.8
+"""The slowest natural frequency of a fast plant comes to lie above this [Hz]. Origin: a body swings at 1 to 1.5 Hz,
+and windows are compared from 0.4 Hz on."""
+
 SLOW_HZ = 3.0
 """The fastest natural frequency of a slow plant comes to lie between this and twice it [Hz]. Origin: by choice: four
 times as much is compared, so that a friction shows its harmonics, and a window has a tenth of the nodes."""
@@ -36,11 +41,13 @@ times as much is compared, so that a friction shows its harmonics, and a window 
 
 def time_scale_of(plant: AbstractPlant, p: Mapping[str, float]) -> float:
     """The time scale of a plant [1] with its parameters ``p`` [SI]; 1 for one that swings nowhere near its origin."""
-    fastest = float(np.max(natural_frequencies(plant, p), initial=0.0))
-    if fastest == 0.0 or SLOWEST_HZ <= fastest <= FASTEST_HZ:
+    found = natural_frequencies(plant, p)
+    if not found.size or SLOWEST_HZ <= found[-1] <= FASTEST_HZ:
         return 1.0
+    slowest, fastest = float(found[0]), float(found[-1])
     if fastest > FASTEST_HZ:
-        return 2.0 ** -ceil(log2(fastest / FASTEST_HZ))
+        wanted, most = ceil(log2(fastest / FASTEST_HZ)), floor(log2(slowest / BODY_HZ))
+        return 2.0 ** -max(min(wanted, most), 0)
     return 2.0 ** ceil(log2(SLOW_HZ / fastest))
 
 

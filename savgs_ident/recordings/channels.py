@@ -164,9 +164,16 @@ def _rule(name: str, layout: RecordingLayout, table: dict[str, object], path: Pa
         )
     _only(table, (*_TEXTS, *_NUMBERS), path, f"key of [channels.{name}]")
     texts = {key: _text(table, key, path) for key in _TEXTS}
-    if (texts["column"] and texts["topic"]) or not table:
+    if texts["field"] is not None and not texts["topic"]:
         raise InputError(
-            "names a column and a topic" if table else "says nothing",
+            "names a field and no topic",
+            source=path,
+            channel=name,
+            remedy="name the topic that has the field",
+        )
+    if "" in (texts["column"], texts["topic"]) or (texts["column"] and texts["topic"]) or not table:
+        raise InputError(
+            "names a column and a topic" if texts["column"] and texts["topic"] else "says nothing",
             source=path,
             channel=name,
             remedy="give a column or a topic, or unit, scale, offset or sign of the signal with the usual name",

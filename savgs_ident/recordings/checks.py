@@ -84,7 +84,7 @@ def screen_test(
         warnings.extend(found)
         if whole is None:
             continue
-        ordered, found = check_time(whole, place, longest_gap)
+        ordered, found = check_time(whole, place, longest_gap, layout.slowest_hz)
         warnings.extend(found)
         channels[name], found = check_possible(ordered, layout.specs[name], place)
         warnings.extend(found)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import ChannelSpec, RecordedChannel, Recording
+from savgs_ident.recordings.recording import SLOWEST_HZ, ChannelSpec, RecordedChannel, Recording
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ LONGEST_GAP = 0.10
 _JUMP_STEPS = 5.0
 """A step this many times the median one is a jump: two lost samples in a row are still jitter of a bus."""
 _MOST_REPEATED = 0.10
-_SLOWEST_HZ, _FASTEST_HZ = 2.0, 200e3
+_FASTEST_HZ = 200e3
 _LONGEST_S = 1e9
 """Thirty years: no test."""
 _FILL = "fill the time column, and check its unit"
@@ -66,11 +66,14 @@ def check_stamps(channel: RecordedChannel, place: DataLocation) -> None:
 
 
 def check_time(
-    channel: RecordedChannel, place: DataLocation, longest_gap: float = LONGEST_GAP
+    channel: RecordedChannel,
+    place: DataLocation,
+    longest_gap: float = LONGEST_GAP,
+    slowest_hz: float = SLOWEST_HZ,
 ) -> tuple[RecordedChannel, tuple[DataWarning, ...]]:
     """The channel with repeated stamps removed, and warnings.
 
-    ``longest_gap`` is how long a gap may be, as a share of the record.
+    ``longest_gap`` is how long a gap may be, as a share of the record; ``slowest_hz`` a logger's lowest rate [Hz].
     Raises :class:`InputError` for stamps that run backwards, are mostly repeated, or have a rate that no
     logger has.
     """
@@ -88,7 +91,7 @@ def check_time(
         )
     channel, warnings = _without_repeats(channel, place)
     median = float(np.median(np.diff(channel.time)))
-    if not 1.0 / _FASTEST_HZ <= median <= 1.0 / _SLOWEST_HZ:
+    if not 1.0 / _FASTEST_HZ <= median <= 1.0 / slowest_hz:
         raise place.error(f"samples are {median:.3g} s apart, which no data logger does", _MIND_UNIT)
     return channel, (*warnings, *_jumps(channel, median, longest_gap, place))
 

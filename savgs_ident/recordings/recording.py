@@ -112,6 +112,10 @@ Check = Callable[[Sequence["Recording"], str], tuple[DataWarning, ...]]
 """From the tests and the name of their source to warnings."""
 
 
+SLOWEST_HZ = 2.0
+"""Samples a second [Hz] that a logger takes at least, of a plant as fast as a quarter car."""
+
+
 @dataclass(frozen=True)
 class RecordingLayout:
     """The channels of a plant's recordings, and what is known about them.
@@ -124,6 +128,7 @@ class RecordingLayout:
         joint: channels that a joint's state gives, if any.
         corrections: applied to all tests together once each is clean.
         checks: what must hold of the plant whatever its parameters.
+        slowest_hz: samples a second [Hz] below which the time is taken to be in another unit.
     """
 
     channels: tuple[ChannelSpec, ...] = ()
@@ -133,6 +138,7 @@ class RecordingLayout:
     joint: JointChannels | None = None
     corrections: tuple[Correction, ...] = ()
     checks: tuple[Check, ...] = ()
+    slowest_hz: float = SLOWEST_HZ
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -151,9 +151,15 @@ def draw_magnitude(
 
 def _phase_of(curve: ModelCurve, c: int) -> NDArray[np.float64]:
     """Phase of a channel [deg], (F,), without jumps along each line."""
-    phase = np.full(curve.frequency.size, np.nan)
-    for places in curve.lines:
-        phase[places] = phase_deg(curve.transfer[places, c])
+    lines = curve.programme if curve.programme.size else np.zeros(curve.frequency.size, np.intp)
+    return _phase_of_lines(curve.transfer[:, c], lines)
+
+
+def _phase_of_lines(transfer: NDArray[np.complex128], programme: NDArray[np.intp]) -> NDArray[np.float64]:
+    """The same of a transfer (F,) on lines with these numbers, (F,)."""
+    phase = np.full(transfer.size, np.nan)
+    for each in np.unique(programme):
+        phase[programme == each] = phase_deg(transfer[programme == each])
     return phase
 
 
@@ -175,7 +181,8 @@ def draw_phase(
         _draw_lines(axes, curve, _phase_of(curve, c), **line)
     if measured is not None:
         error = _SIGMAS * np.degrees(measured.phase_sd[:, c])
-        axes.errorbar(measured.frequency, phase_deg(measured.transfer[:, c]), error, **_POINTS)
+        phase = _phase_of_lines(measured.transfer[:, c], measured.programme)
+        axes.errorbar(measured.frequency, phase, error, **_POINTS)
 
 
 def draw_peak_to_peak(

@@ -144,8 +144,14 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
     step = min(each.step for each in motions)
     even = [_resampled(each, step) for each in motions]
     sizes = [each.position.size for each in even]
-    weights = np.array([each.row_times.size for each in motions])
-    noise = float(np.sqrt(np.average([each.noise**2 for each in motions], weights=weights)))
+    weights, scale = (
+        np.array([each.row_times.size for each in motions]),
+        min(each.time_scale for each in motions),
+    )
+    # A row of fewer samples has more of their noise.
+    spacing = samples_to_a_row(step / scale) * step
+    noises = [each.noise * np.sqrt(each.every * each.step / spacing) for each in motions]
+    noise = float(np.sqrt(np.average(np.square(noises), weights=weights)))
     position, velocity, acceleration, drive, still = (
         np.concatenate([getattr(each, name) for each in even]) for name in _SIGNALS
     )
@@ -161,7 +167,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
         still,
         _said_once([warning for each in motions for warning in each.warnings], source),
         tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
-        min(each.time_scale for each in motions),
+        scale,
         {name: np.concatenate([each.beside[name] for each in even]) for name in even[0].beside},
     )
 

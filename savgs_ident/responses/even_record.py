@@ -22,6 +22,9 @@ REST_S = 0.2
 RESTING = 1e-3
 """Range that a channel may have at rest, over that in the whole test, where its noise is not larger [1]."""
 
+LEAST_SAMPLES = 2.5
+"""Samples in a period of the highest frequency that is compared, at least."""
+
 _RATE_HZ = 1000.0
 _FEWEST = 10
 _NOISY = 8.0
@@ -127,7 +130,7 @@ def even_record(
         )
     rates = {name: (time.size - 1) / (time[-1] - time[0]) for name, (time, _) in usable.items()}
     last = min(rates, key=lambda name: rates[name])
-    if rates[last] < 2.5 * highest_hz:
+    if rates[last] < LEAST_SAMPLES * highest_hz:
         return refuse(
             f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {highest_hz:g} Hz",
             f"sample every channel at {4.0 * highest_hz:g} Hz or faster",

@@ -7,12 +7,15 @@ several programmes in one. A line through all its dwells would go up and down be
 import numpy as np
 from numpy.typing import NDArray
 
-SAME = 5e-3
+SAME = 1e-3
 """Frequencies that differ by less than this are one [1]."""
 
 ALIKE = 0.5
 """A programme is followed to a dwell whose amplitude differs from that at the frequency before by less than a factor
 exp of this, or whose levels by less than this of their range. Origin: by choice; amplitudes may fall along it."""
+
+REPEATED = 0.05
+"""The same of two dwells at one frequency that are one programme: the second repeats the first."""
 
 
 def driven_alike(frequency: NDArray[np.float64], settings: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -23,25 +26,30 @@ def driven_alike(frequency: NDArray[np.float64], settings: NDArray[np.float64]) 
     found, last = np.zeros(frequency.size, np.intp), list[NDArray[np.float64]]()
     order = np.argsort(frequency, kind="stable")
     apart = np.diff(np.log(frequency[order])) > SAME
-    together = np.split(order, np.flatnonzero(apart) + 1)
-    if all(each.size < 2 for each in together):
+    if apart.all():
         return found
-    for dwells in together:
-        known = np.array(last)
-        distances = (
-            np.linalg.norm(settings[dwells][:, None] - known, axis=2) if last else np.zeros((dwells.size, 0))
-        )
-        left, free = set(range(dwells.size)), set(range(len(last)))
-        for place in np.argsort(distances, axis=None):
-            one, chain = divmod(int(place), len(last))
-            if one in left and chain in free and distances[one, chain] < ALIKE:
-                found[dwells[one]] = chain
-                last[chain] = settings[dwells[one]]
-                left.discard(one)
-                free.discard(chain)
-        for one in sorted(left):
-            found[dwells[one]] = len(last)
-            last.append(settings[dwells[one]])
+    for dwells in np.split(order, np.flatnonzero(apart) + 1):
+        before = len(last)
+        pairs = [
+            (float(np.linalg.norm(settings[d] - last[chain])), int(d), chain)
+            for d in dwells
+            for chain in range(before)
+        ]
+        placed, taken = dict[int, int](), set[int]()
+        for distance, d, chain in sorted(pairs):
+            if d not in placed and chain not in taken and distance < ALIKE:
+                placed[d] = chain
+                taken.add(chain)
+        for d in (int(each) for each in dwells):
+            same = (
+                placed[other] for other in placed if np.linalg.norm(settings[d] - settings[other]) < REPEATED
+            )
+            if d not in placed:
+                placed[d] = next(same, len(last))
+            if placed[d] == len(last):
+                last.append(settings[d])
+        for d, chain in placed.items():
+            found[d], last[chain] = chain, settings[d]
     return found
 
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, Recording, TestKind
-from savgs_ident.responses.even_record import EvenRecord, even_record
+from savgs_ident.responses.even_record import LEAST_SAMPLES, EvenRecord, even_record
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import estimate_standstill_noise
 from savgs_ident.responses.selection import only_tests
@@ -235,8 +235,9 @@ def _as_sampled(tests: Sequence[Recording], names: Sequence[str], usual: float) 
     A channel that is sampled too slowly for a third of the usual is refused later, with what to do.
     """
     rates = [each.channels[name].rate_hz for each in tests for name in names if name in each.channels]
-    sampled = min((rate / SAMPLES for rate in rates), default=usual)
-    return min(usual, sampled) if sampled >= usual / 3.0 else usual
+    slowest = min(rates, default=LEAST_SAMPLES * usual)
+    fits = slowest >= LEAST_SAMPLES * usual or slowest < SAMPLES * usual / 3.0
+    return usual if fits else slowest / SAMPLES
 
 
 def _compared_less(source: str, highest: float, usual: float) -> DataWarning:

@@ -1,7 +1,7 @@
 """A plant that is held against the force of its drive along a measured motion: which test, and what is typical there.
 
 Under closed loop the position hides what a model lacks (:mod:`savgs_ident.responses.driven_motion`). A plant with one
-coordinate and one input is taken so wherever its recordings have no harmonic dwell.
+coordinate whose first input is its drive is taken so wherever its recordings have no harmonic dwell.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import InputSignal, Port, PortKind
-from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.effects.laws.input_offset import MOTIONS
+from savgs_ident.plants.base import AbstractPlant, Input
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion, joined
@@ -36,8 +38,7 @@ def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
     """
     if len(plant.coordinates) != 1:
         return False
-    unit = plant.coordinates[0].unit
-    return plant.inputs[0].unit not in (unit, f"{unit}/s", f"{unit}/s^2")
+    return plant.inputs[0].unit not in MOTIONS
 
 
 def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
@@ -78,7 +79,10 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
     refused: list[InputError] = []
     for test in moving:
         try:
-            found.append(recorded(test, reading, drive.name, campaign.source, [each.name for each in others]))
+            known = [each.name for each in others if each.required or each.name in test.channels]
+            found.append(
+                _with_rest(recorded(test, reading, drive.name, campaign.source, known), others, model.table)
+            )
         except InputError as error:
             refused.append(error)
     if not found:
@@ -86,6 +90,13 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
     motion = joined(found, campaign.source)
     left_out = tuple(error.as_warning("tests_not_used") for error in refused)
     return replace(motion, warnings=(*campaign.warnings, *motion.warnings, *left_out))
+
+
+def _with_rest(motion: DrivenMotion, inputs: Sequence[Input], table: ParameterTable) -> DrivenMotion:
+    """The motion with further inputs in their order, at rest where they were not recorded and need not be."""
+    rest = {each.name: table[each.rest].value if each.rest else 0.0 for each in inputs}
+    still = {name: np.full(motion.position.size, value) for name, value in rest.items()}
+    return replace(motion, beside=still | dict(motion.beside))
 
 
 def _refuse_undriven(model: Model, source: str) -> None:
@@ -104,8 +115,20 @@ def _reading(plant: AbstractPlant | type[AbstractPlant]) -> str:
     return read.get(coordinate.unit) or read.get(f"{coordinate.unit}/s", "")
 
 
-def samples_of(motion: DrivenMotion) -> Samples:
-    """A measured motion as the equations take it."""
+def samples_of(motion: DrivenMotion, plant: AbstractPlant | type[AbstractPlant]) -> Samples:
+    """A measured motion as the equations of a plant take it.
+
+    Raises :class:`InputError` where it lacks one of the plant's further inputs.
+    """
+    others = [each.name for each in plant.inputs[1:]]
+    lacking = [name for name in others if name not in motion.beside]
+    if lacking:
+        raise InputError(
+            f"the motion lacks the input '{lacking[0]}'",
+            source=motion.source,
+            channel=lacking[0],
+            remedy="give the recordings as a campaign, in which each input is a channel",
+        )
     speed = 2.0 * np.pi / motion.period
     angle = speed * motion.step * np.arange(motion.position.size)
     return Samples(
@@ -118,7 +141,8 @@ def samples_of(motion: DrivenMotion) -> Samples:
         speed=jnp.full(angle.size, speed),
         begins=jnp.asarray(motion.begins),
         beside=tuple(
-            InputSignal(jnp.asarray(each), jnp.asarray(motion.rate(each))) for each in motion.beside.values()
+            InputSignal(jnp.asarray(each), jnp.asarray(motion.rate(each)))
+            for each in (motion.beside[name] for name in others)
         ),
     )
 
@@ -145,7 +169,7 @@ def sized_along(model: Model, motion: DrivenMotion) -> Model:
             return replace(port, displacement=DRIVE_SHARE * force)
         if port.kind is not PortKind.FORCE:
             return port
-        along = np.asarray(force_gain(bare, p, samples_of(motion), motion.step, port.name))
+        along = np.asarray(force_gain(bare, p, samples_of(motion, bare), motion.step, port.name))
         gain = float(np.sqrt(np.mean(along**2)))
         return replace(port, force=FORCE_SHARE * force / gain) if gain > 0.0 else port
 

@@ -37,8 +37,8 @@ from savgs_ident.simulate.excitation import (
     sine_excitation,
     typical_amplitude,
 )
-from savgs_ident.simulate.mesh import Layout, layout_for
-from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.mesh import Layout
+from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.readings import harmonics
 
@@ -117,7 +117,7 @@ def simulate_response(
 
 def simulate_between(known: SimulatedResponse) -> SimulatedResponse:
     """``known`` and as many frequencies again, see :func:`interpolate_excitation`, as one."""
-    layout = layout_for(known.frequency, _DRAWN.nodes, _DRAWN.slow)
+    layout = layout_of(known.excitation, _DRAWN, known.model.build())
     orders = known.harmonics.shape[2] - 1
     added = interpolate_excitation(known.excitation, programmes_of(known.model.plant, known.excitation))
     return merge_responses(known, simulate_response(known.model, added, orders, _DRAWN, layout))

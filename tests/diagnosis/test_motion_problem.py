@@ -131,7 +131,7 @@ def test_errors_of_the_sensor_are_no_candidates_where_the_motion_is_taken_as_mea
 @pytest.mark.slow
 def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() -> None:
     motion = driven_motion(_held({}, 4))
-    with pytest.raises(si.InputError, match="no plant with one coordinate and one input"):
+    with pytest.raises(si.InputError, match="no plant with one coordinate whose first input is its drive"):
         si.diagnose(si.PlantModel(si.TwoMass(), si.TwoMass.parameters), motion)
     response = si.simulate_dwells(
         si.PlantModel(si.TwoMass(), si.TwoMass.parameters),

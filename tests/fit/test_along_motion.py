@@ -45,7 +45,7 @@ def _needed(laws: Mapping[str, float], seed: int, noise: float = 0.3) -> DrivenM
     recording = recorded_axis({}, seed)
     model, motion = axis_with(*TEXTBOOK), driven_motion(recording)
     p = as_values(model.table.as_dict() | dict(laws))
-    force = np.asarray(needed_force(model.build(), p, samples_of(motion), motion.step).force)
+    force = np.asarray(needed_force(model.build(), p, samples_of(motion, model.build()), motion.step).force)
     drawn = noise * np.random.default_rng(seed).normal(size=force.size)
     return driven_motion(replace(recording, force=force + drawn))
 

@@ -1,5 +1,7 @@
 """Along a measured motion, further inputs than the drive: the current of a damper's coil, by the damper's formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,7 +77,7 @@ def test_it_is_brought_along_in_the_order_of_the_inputs(campaign: Campaign) -> N
     model = si.PlantModel(Damper(), Damper.parameters)
     assert is_driven(Damper())
     motion = motion_of(campaign, model)
-    (current,) = samples_of(motion).beside
+    (current,) = samples_of(motion, Damper()).beside
     assert list(motion.beside) == ["current"]
     assert current.value.shape == motion.position.shape
     begun = np.asarray(motion.starts)
@@ -83,6 +85,24 @@ def test_it_is_brought_along_in_the_order_of_the_inputs(campaign: Campaign) -> N
     without = {name: each for name, each in campaign.recordings[0].channels.items() if name != "current"}
     with pytest.raises(InputError, match="was not recorded"):
         motion_of(Campaign("made", (Recording("run", "other", None, without),), (), ""), model)
+
+
+def test_one_that_need_not_be_recorded_rests_and_one_that_is_lacking_is_named(campaign: Campaign) -> None:
+    class Optional(Damper):
+        inputs = (Damper.inputs[0], replace(Damper.inputs[1], required=False))
+
+    tests = list(campaign.recordings)
+    known = {name: each for name, each in tests[1].channels.items() if name != "current"}
+    tests[1] = replace(tests[1], channels=known)
+    motion = motion_of(
+        replace(campaign, recordings=tuple(tests)), si.PlantModel(Optional(), Damper.parameters)
+    )
+    begun = np.asarray(motion.starts)
+    assert begun.size == 3
+    assert not motion.beside["current"][begun[1] : begun[2]].any()
+    assert motion.beside["current"][begun[2]] == pytest.approx(1.0)
+    with pytest.raises(InputError, match="lacks the input 'current'"):
+        samples_of(replace(motion, beside={}), Damper())
 
 
 def test_a_fit_finds_what_it_does(campaign: Campaign) -> None:

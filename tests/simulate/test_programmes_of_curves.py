@@ -1,6 +1,7 @@
 """Dwells that are driven alike are on one line."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,6 +33,13 @@ def test_amplitudes_and_levels_are_told_apart_in_any_order(order: list[int], fal
     pairs = {(int(a), int(b)) for a, b in zip(wanted[order], found, strict=True)}
     assert len(pairs) == 3
     assert {a for a, _ in pairs} == {b for _, b in pairs} == {0, 1, 2}
+
+
+@pytest.mark.parametrize("step", [1e-5, 1e-3, 3e-3, 5e-3, 0.01])
+def test_a_fine_grid_of_frequencies_is_one_line(step: float) -> None:
+    fine = 5.0 * np.exp(step * np.arange(60))
+    assert not driven_alike(fine, settings(np.full(60, 0.004))).any()
+    assert not driven_alike(np.repeat(fine, 2), settings(np.full(120, 0.004))).any()
 
 
 def test_a_level_that_hardly_varies_is_one_level() -> None:

@@ -11,9 +11,11 @@ from savgs_ident.core.values import as_values
 from savgs_ident.effects.effect import typical_effect
 from savgs_ident.effects.laws.attached_oscillator import AttachedOscillator
 from savgs_ident.effects.laws.lag import Lag
-from savgs_ident.plants.time_scale import FASTEST_HZ, SLOW_HZ, SLOWEST_HZ, natural_frequencies, time_scale_of
+from savgs_ident.plants import time_scale
+from savgs_ident.plants.time_scale import natural_frequencies, time_scale_of
 from savgs_ident.plants.two_mass import GUIDE, PARAMETERS, SENSORS, TwoMass
-from savgs_ident.recordings.recording import Campaign, Recording
+from savgs_ident.recordings.checks_signal import DataLocation, check_time
+from savgs_ident.recordings.recording import SLOWEST_HZ, Campaign, Recording
 from savgs_ident.simulate.excitation import measured_excitation, measured_response
 from savgs_ident.simulate.forgetting import forgetful_motion
 from savgs_ident.simulate.periodic import simulate_periodic
@@ -67,12 +69,23 @@ def test_natural_frequencies_come_to_lie_where_those_of_a_quarter_car_do(times: 
     scale = time_scale_of(TwoMass(), quicker(times).as_dict())
     fastest = times * known[-1] * scale
     assert np.log2(scale) == round(np.log2(scale))
-    if SLOWEST_HZ <= times * known[-1] <= FASTEST_HZ:
+    if time_scale.SLOWEST_HZ <= times * known[-1] <= time_scale.FASTEST_HZ:
         assert scale == 1.0
     elif scale < 1.0:
-        assert 0.5 * FASTEST_HZ < fastest <= FASTEST_HZ
+        assert 0.5 * time_scale.FASTEST_HZ < fastest <= time_scale.FASTEST_HZ
     else:
-        assert SLOW_HZ <= fastest < 2.0 * SLOW_HZ
+        assert time_scale.SLOW_HZ <= fastest < 2.0 * time_scale.SLOW_HZ
+
+
+def test_a_stiff_part_does_not_hide_what_swings_slowly() -> None:
+    """A body at 2.2 Hz on a tyre that hardly gives: 230 Hz."""
+    stiff = PARAMETERS.as_dict() | {"k_t": 1e8}
+    slow, fast = natural_frequencies(TwoMass(), stiff)
+    assert slow < 2.5
+    assert fast > 200.0
+    scale = time_scale_of(TwoMass(), stiff)
+    assert scale == 0.5
+    assert slow * scale > time_scale.BODY_HZ
 
 
 def test_a_plant_that_swings_nowhere_or_whose_equations_fail_has_a_scale_of_one() -> None:
@@ -141,6 +154,20 @@ def test_a_dwell_that_is_so_many_times_as_fast_has_the_same_nodes() -> None:
         counts.append((solution.mesh.layout.counts, np.asarray(solution.mesh.phase)))
     assert counts[0][0] == counts[1][0]
     np.testing.assert_allclose(counts[0][1], counts[1][1], atol=1e-6)
+
+
+def test_a_slow_plant_may_be_sampled_as_slowly_and_a_fast_one_no_faster() -> None:
+    slow, usual, fast = (
+        si.PlantModel(TwoMass(), quicker(each)).layout.slowest_hz for each in (0.02, 1.0, 50.0)
+    )
+    assert usual == fast == SLOWEST_HZ
+    assert slow == SLOWEST_HZ / 16.0
+    time = np.arange(400) * 4.0
+    channel = channel_of("road_height", time, np.sin(0.01 * time))
+    place = DataLocation("made", "road", "road_height")
+    assert check_time(channel, place, slowest_hz=slow)[0] is channel
+    with pytest.raises(si.InputError, match="4 s apart"):
+        check_time(channel, place)
 
 
 @pytest.mark.parametrize("scale", [0.25, 8.0])

@@ -16,7 +16,7 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractInputLaw, Family, Fundamental, InputSignal, Port, PortKind, Role
 
-_MOTIONS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2")
+MOTIONS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2")
 """Units of what is moved, not driven."""
 
 
@@ -40,7 +40,7 @@ class InputOffset(AbstractInputLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where the input is no motion: a road that lies higher is the same road."""
-        return port.kind is PortKind.INPUT and port.displacement_unit not in _MOTIONS
+        return port.kind is PortKind.INPUT and port.displacement_unit not in MOTIONS
 
     def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """The constant."""
