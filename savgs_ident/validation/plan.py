@@ -213,15 +213,18 @@ def plan(
 
 def _held(model: Model, levels: Mapping[str, Sequence[float]] | None) -> Iterator[Mapping[str, float]]:
     """Levels of further inputs to choose among, rest first."""
+    typical = typical_levels(model.build(), model.table)
     if levels is None:
-        typical = typical_levels(model.build(), model.table) if isinstance(model, PlantModel) else {}
-        levels = {name: [0.5 * level, level] for name, level in typical.items()}
+        # A rig is planned as it is run: with its link where it is.
+        offered = typical if isinstance(model, PlantModel) else {}
+        levels = {name: [0.5 * level, level] for name, level in offered.items()}
     yield {}
-    known = [each.name for each in model.plant.inputs[1:]]
     for name, each in levels.items():
-        if name not in known:
-            among = ", ".join(known) or "it has one input only"
-            raise InputError(f"the plant has no further input '{name}'", remedy=f"choose among: {among}")
+        if name not in typical:
+            among = ", ".join(typical) or "it has none"
+            raise InputError(
+                f"the plant has no further input '{name}' whose level counts", remedy=f"choose among: {among}"
+            )
         yield from ({name: level} for level in each if level)
 
 
