@@ -34,7 +34,7 @@ _BLOCK = (1.82, 3.42)
 """Left and right side of the block [inch]."""
 
 _BAR, _THICK = 0.6, 0.078
-_LETTERS: Mapping[Side, int] = {"input": 17, "inside": 22, "sensor": 17}
+_LETTERS: Mapping[Side, int] = {"input": 17, "inside": 22, "sensor": 16}
 """So many letters of a name fit into a line."""
 
 
@@ -58,7 +58,8 @@ def block_ports(diagnosis: Diagnosis) -> tuple[BlockPort, ...]:
         kinds.setdefault(other, [])
     return tuple(
         BlockPort(
-            port_words(diagnosis, location),
+            # What stands on the right are sensors: there is no room to say so before each name.
+            port_words(diagnosis, location).removeprefix("sensor."),
             _side(kind),
             shares.get(location, float("nan")),
             location in diagnosis.verdict.ports,
