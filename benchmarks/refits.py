@@ -82,7 +82,14 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "cannot be doubled": ("lookalike_cosine",),
     "what is shown": (
         *("reported_share", "visible_sigma", "assessable_sizes", "reversal_speed", "mid_stroke_speed"),
-        *("small_discrepancy", "same_regime_share", "fewest_trend_tests", "sweep_dwells", "proposed_tests"),
+        *(
+            "small_discrepancy",
+            "noisiest",
+            "same_regime_share",
+            "fewest_trend_tests",
+            "sweep_dwells",
+            "proposed_tests",
+        ),
         *("proposed_dwells", "curve_alike", "fewest_held_out_tests"),
     ),
 }

@@ -38,6 +38,7 @@ from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes
 from savgs_ident.inference.background.locations import Linearisation, input_locations
 from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.inference.background.shared_errors import background_about, without_drifts
+from savgs_ident.inference.beginnings import Begun
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.likely_mistake import likely_mistake
@@ -75,6 +76,7 @@ class DwellProblem(AbstractProblem):
         recorded: when each test was recorded, in any unit of time; the tests are in that order where empty.
         beyond: what drifts do to all rows beyond first order [unit of each], (m,); None where nothing drifts.
         beside: what else was recorded in each test [its unit], (D,) by name; NaN where it was not.
+        begun: the states with which tests begin that do not begin at rest; None where all do.
     """
 
     excitation: Excitation = field(kw_only=True)
@@ -85,6 +87,7 @@ class DwellProblem(AbstractProblem):
     recorded: tuple[float, ...] = field(default=(), kw_only=True)
     beyond: NDArray[np.float64] | None = field(default=None, kw_only=True)
     beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
+    begun: Begun | None = field(default=None, kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
@@ -159,11 +162,15 @@ class DwellProblem(AbstractProblem):
     ) -> tuple[AbstractPlant, Values, PeriodicSolution]:
         """The model with ``terms`` at ``values`` [SI], its parameters, and its motions from those ``known``.
 
-        Under their excitation, on their nodes; look at ``status()`` of the motions.
+        Under their excitation, on their nodes, in tests that do not begin at rest from where they miss least; look at
+        ``status()`` of the motions.
         """
         model, p = self._model_with(terms, values)
         self._have_compiled(model, p)
-        return model, p, resolve_with_states(model, p, known, partial(self._signals_along, p=p))
+        found = resolve_with_states(model, p, known, partial(self._signals_along, p=p))
+        if self.begun is not None and found.excitation.moving.size and joint_status(found.status()).ok:
+            found = self.begun.best(model, p, found)
+        return model, p, found
 
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
@@ -394,5 +401,6 @@ def dwell_problem(
         constants=constants,
         recorded=tuple(measured.times.tolist()),
         beside=measured.beside,
+        begun=None if measured.beginnings is None else Begun.of_response(measured, plant, orders),
     )
     return problem, likelihood.data

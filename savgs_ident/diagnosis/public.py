@@ -28,8 +28,10 @@ from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, 
 from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.beginnings import compared_response, settle_beginnings
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.port_sizes import sized_to
+from savgs_ident.inference.problem import ProblemSettings
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
@@ -39,7 +41,6 @@ from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 from savgs_ident.simulate.driven_plant import motion_in, motion_of, origin_along, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep
-from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -202,9 +203,12 @@ def ask(
         sized = sized_along(model, measured)
         settings, values = _asked(sized, 0, without, constants)
         return AskedMotion(measured, sized.before, settings, values)
-    response = forgetful_response(measured, model, orders, max_frequency, progress)
+    response = compared_response(measured, model, orders, max_frequency, progress)
     model, resized = sized_to(model, response)
     given, settings, values = baseline_of(model, orders, without, constants)
+    if response.beginnings is not None:
+        options = ProblemSettings(orders=orders)
+        response, _ = settle_beginnings(response, given, tuple(settings.free), options, progress)
     return AskedDwells(response, given, settings, values, (*response.warnings, *resized))
 
 

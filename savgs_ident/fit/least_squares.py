@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
@@ -192,14 +192,16 @@ def fit_least_squares(
     settings: FitSettings | None = None,
     origin: Origin = NO_ORIGIN,
     motion: PeriodicSolution | None = None,
+    begin: Float[Array, " n"] | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit ``free`` parameters of a model to a measured response.
 
     ``origin`` is that of the result; ``motion`` is that of the model as given in the same tests, where it is known
-    already; ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not exist or
-    that the model does not use, for a response that cannot be used, and for a plant that may be anywhere, as no force
-    brings it back. Look at ``trusted`` of the result.
+    already; the search goes on from the free coordinates ``begin`` where these were found before, and no other
+    start is tried; ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not
+    exist or that the model does not use, for a response that cannot be used, and for a plant that may be anywhere, as
+    no force brings it back. Look at ``trusted`` of the result.
     """
     began, report = time.perf_counter(), progress or _silent
     settings = settings or FitSettings()
@@ -213,7 +215,11 @@ def fit_least_squares(
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     report("preparing the fit")
     minimiser = Minimiser(problem)
-    first_u, *others = _starts(task, settings.starts)
+    first_u, *others = _starts(task, settings.starts) if begin is None else [begin]
+    if begin is not None:
+        first = simulate_periodic(
+            problem.model, problem.parameters(begin), task.excitation, settings.periodic
+        )
     tried = [minimiser.minimise(first_u, first, settings.steps, report, enough=ROUGHLY)]
     for u in others:
         if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:

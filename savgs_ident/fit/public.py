@@ -18,6 +18,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.along_motion import MotionComparison, MotionFit, compare_along_motion, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
+from savgs_ident.inference.beginnings import compared_motion, compared_response, settle_beginnings
 from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
@@ -34,7 +35,6 @@ from savgs_ident.simulate.excitation import (
     measured_excitation,
     response_of_tests,
 )
-from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -140,15 +140,25 @@ def fit_with(
     if settings.quantity == "peak_to_peak":
         response, motion = _with_peaks(measured, drawing, settings.orders, max_frequency, progress), None
     else:
-        response, motion = forgetful_motion(measured, drawing, settings.orders, max_frequency, progress)
+        response, motion = compared_motion(measured, drawing, settings.orders, max_frequency, progress)
     drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
     warnings = (*response.warnings, *resized)
     origin = model.origin(campaign_of(measured), warnings).with_command(command)
     # Beside other programs threads of the linear algebra wait for each other: its largest matrices take thirty times
     # as long, and on cores that are free they gain a tenth of a second.
     with threadpool_limits(1, "blas"):
+        begin = None
+        if response.beginnings is not None:
+            response, begin = settle_beginnings(response, drawing, names, settings.problem, progress)
         return fit_least_squares(
-            response, drawing, free=names, settings=settings, origin=origin, motion=motion, progress=progress
+            response,
+            drawing,
+            free=names,
+            settings=settings,
+            origin=origin,
+            motion=motion,
+            begin=begin,
+            progress=progress,
         )
 
 
@@ -259,7 +269,7 @@ def compare(
     if isinstance(measured, DrivenMotion):
         progress("finding the force that the model needs")
         return compare_along_motion(model, measured, origin_along(model, measured))
-    response = forgetful_response(measured, model.before, orders, None, progress)
+    response = compared_response(measured, model.before, orders, None, progress)
     excitation = measured_excitation(model.plant, response, model.table)
     names = [each.name for each in model.channels]
     places = [response.channel(name) for name in names if name in response.channels]

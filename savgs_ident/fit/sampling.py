@@ -25,6 +25,7 @@ from savgs_ident.fit.identifiability import (
 from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
 from savgs_ident.inference.background.constants import BACKGROUND
+from savgs_ident.inference.beginnings import compared_response
 from savgs_ident.inference.harmonic_question import PosedHarmonics, Question
 from savgs_ident.inference.motion_question import MotionQuestion, PosedMotion
 from savgs_ident.inference.posterior_mode import PosteriorMode
@@ -38,7 +39,6 @@ from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.driven_plant import motion_in, origin_along, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of
-from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -167,7 +167,7 @@ def _measured(
 ) -> HarmonicResponse:
     if measured is not None:
         model = identified.model if isinstance(identified, Fit) else identified
-        return forgetful_response(measured, model.before, orders, max_frequency, progress)
+        return compared_response(measured, model.before, orders, max_frequency, progress)
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")

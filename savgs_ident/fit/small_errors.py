@@ -60,7 +60,10 @@ class FitWithErrors(NamedTuple):
 
 
 class LargeErrors(NamedTuple):
-    """The model would have to err by more than models do: ``error`` at each port, as a share of the response [1]."""
+    """The model would have to err by more than models do, or the noise to be more than what is recorded of it.
+
+    By ``error`` at each port, as a share of the response [1].
+    """
 
     error: float
 
@@ -112,8 +115,9 @@ def fit_with_errors(
     found, scale = there.found, np.outer(widths, widths)
     if not found.status.ok:
         return None
-    if found.noise_scales.discrepancy > BACKGROUND.largest_error:
-        return LargeErrors(found.noise_scales.discrepancy)
+    scales = found.noise_scales
+    if scales.discrepancy > BACKGROUND.largest_error or scales.noise > BACKGROUND.noisiest:
+        return LargeErrors(scales.discrepancy)
     ended = minimiser.evaluate(jnp.asarray(found.x * widths), found.prediction.warm_start)
     if not ended.evaluation.ok:
         return None

@@ -20,6 +20,7 @@ coordinates of a point that a sampler moves, in :func:`noise_scales` at their be
 that misses is thereby weighed by what it can explain.
 """
 
+from dataclasses import replace
 from math import exp, isfinite, log, sqrt
 from typing import NamedTuple
 
@@ -75,12 +76,14 @@ class Likelihood(RowLikelihood):
 
     ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
     the rows that are compared; both are without dimension. Where rows share errors, ``turning`` (m, m) makes rows
-    without unit of them that do not.
+    without unit of them that do not. ``silent`` are directions of the rows that are not turned in which they say
+    nothing, each as large as their noise [units of the rows].
     """
 
     axes: Float[Array, "D C K 2 2"]
     place: np.ndarray
     turning: Float[Array, "m m"] | None = None
+    silent: Float[Array, "m t"] | None = None
 
     def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Predicted harmonics as rows [units of the channels, or 1 where they are turned], (m,)."""
@@ -110,7 +113,10 @@ class Likelihood(RowLikelihood):
     @property
     def data(self) -> Data:
         """The measured rows; those that are turned are of all tests and count as of one."""
-        return super().data if self.turning is not None else self._data(self.test)
+        if self.turning is not None:
+            return super().data
+        found = self._data(self.test)
+        return found if self.silent is None else replace(found, silent=np.asarray(self.silent))
 
     def harmonics(
         self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
@@ -144,7 +150,21 @@ def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likel
         variance=jnp.asarray(variance),
         discrepancy_scale=jnp.asarray(discrepancy_scale),
         scales=scales or Scales(),
+        silent=None
+        if target.silent is None
+        else _silent_rows(np.asarray(target.silent), whitening, axes, place),
     )
+
+
+def _silent_rows(
+    silent: np.ndarray, whitening: np.ndarray, axes: np.ndarray, place: np.ndarray
+) -> Float[Array, "m t"]:
+    """Directions of the residuals of a target (all, t) as directions of the rows."""
+    unused = np.all(whitening == 0.0, axis=(-2, -1), keepdims=True)
+    spread = np.linalg.inv(whitening + unused * np.eye(2))
+    parts = silent.reshape(*whitening.shape[:-1], -1)
+    rows = np.einsum("dckij,dckjl,dcklt->dckit", axes, spread, parts)
+    return jnp.asarray(rows.reshape(-1, silent.shape[1])[place])
 
 
 def sharing_errors(likelihood: Likelihood, data: Data) -> Likelihood:

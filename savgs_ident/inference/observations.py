@@ -16,6 +16,11 @@ MULTIPLES = (0.4, 1.0, 2.5)
 """Shapes are tried at these multiples of their typical values, unless a term says otherwise."""
 
 
+SILENT = 1e5
+"""Errors in their noise with which rows say nothing in a direction: far more than any misfit, and no more than a
+factorisation resolves."""
+
+
 @dataclass(frozen=True)
 class Prediction:
     """A plant at a point.
@@ -138,6 +143,8 @@ class Data:
         shared: B, by how much it moves them together, (m, k); None where they share nothing.
         tolerated: errors of known size that they share, (m, t): what is known of the model to a tolerance, but is no
             number of its own. Their scale is that of the noise. None where there are none.
+        silent: directions in which they say nothing, each as large as their noise, (m, s): what other beginnings of
+            tests would change. None where there are none.
     """
 
     measured: NDArray[np.float64]
@@ -147,6 +154,7 @@ class Data:
     scales: Scales = field(default_factory=Scales)
     shared: NDArray[np.float64] | None = None
     tolerated: NDArray[np.float64] | None = None
+    silent: NDArray[np.float64] | None = None
 
     def part(self, mask: NDArray[np.bool_]) -> "Data":
         """The numbers that ``mask`` (m,) picks: the same object each time, for its axes take long to find."""
@@ -170,6 +178,7 @@ class Data:
             self.scales,
             None if self.shared is None else self.shared[mask],
             None if self.tolerated is None else self.tolerated[mask],
+            None if self.silent is None else self.silent[mask],
         )
 
     @cached_property
@@ -218,7 +227,7 @@ class Data:
 
     @property
     def _share(self) -> bool:
-        return self.shared is not None or self.tolerated is not None
+        return any(each is not None for each in (self.shared, self.tolerated, self.silent))
 
     @cached_property
     def _axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -226,6 +235,8 @@ class Data:
         noise, alone = np.diag(self.variance), np.diag(self.discrepancy_scale)
         if self.tolerated is not None:
             noise += self.tolerated @ self.tolerated.T
+        if self.silent is not None:
+            noise += (SILENT * self.silent) @ (SILENT * self.silent).T
         whiten = solve_triangular(np.linalg.cholesky(noise), np.eye(noise.shape[0]), lower=True)
         errors = whiten @ (alone if self.shared is None else np.concatenate([alone, self.shared], axis=1))
         squares, axes = np.linalg.eigh(errors @ errors.T)

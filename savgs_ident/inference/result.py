@@ -205,13 +205,17 @@ class Posterior(Result, ABC):
         return not self["discrepancy"].q025 > BACKGROUND.largest_error
 
     @property
+    def condition(self) -> str:
+        """What would have to be so for the model to explain the data, in words."""
+        return f"it would have to err by {100.0 * self['discrepancy'].median:.2g} % {self.errs_in}"
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Why the draws are not to be trusted, the most important first."""
         if self.explained:
             return self.convergence.reasons
-        missed = 100.0 * self["discrepancy"].median
         what = (
-            f"{UNEXPLAINED}: for that it would have to err by {missed:.2g} % {self.errs_in}; "
+            f"{UNEXPLAINED}: for that {self.condition}; "
             "look for what is missing with `diagnose`, until then the parameters make up for it by more than their "
             "intervals say"
         )
@@ -251,6 +255,22 @@ class HarmonicPosterior(Posterior):
 
     predictive: Predictive
     measured: HarmonicResponse
+
+    @property
+    def explained(self) -> bool:
+        """Whether it may have no more than small errors, and the noise be what the recordings show of it."""
+        return super().explained and not self._is_noisy
+
+    @property
+    def condition(self) -> str:
+        """What would have to be so for the model to explain the data, in words."""
+        if not self._is_noisy:
+            return super().condition
+        return f"the noise would have to be {self['noise_scale'].median:.2g} times what the recordings show"
+
+    @property
+    def _is_noisy(self) -> bool:
+        return self["noise_scale"].q025 > BACKGROUND.noisiest
 
     @property
     def count_inside(self) -> tuple[int, int]:

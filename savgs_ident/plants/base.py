@@ -338,11 +338,14 @@ class Excitation(NamedTuple):
         frequency: fundamental [Hz], (D,).
         harmonics: of each input by its name [its unit], (D, K + 1), with as many orders as each needs.
         part: of each period that is compared of what sensors read; None where all of it is, at all orders.
+        beginnings: states of the plant with which tests begin that do not begin at rest [SI], (D, m); None where none
+            does, or where these begin at rest as long as nothing better is known.
     """
 
     frequency: Float[Array, " D"]
     harmonics: Mapping[str, Complex[Array, "D K"]]
     part: ComparedPart | None = None
+    beginnings: Float[Array, "D m"] | None = None
 
     @property
     def spacing(self) -> Float[Array, " D"]:
@@ -356,9 +359,15 @@ class Excitation(NamedTuple):
         return none if self.part is None else np.flatnonzero(~self.part.repeats)
 
     @property
-    def begins_at_rest(self) -> tuple[int, ...]:
-        """Places of the windows before which the plant rested."""
-        return () if self.part is None else tuple(np.flatnonzero(self.part.begins_at_rest).tolist())
+    def opened(self) -> tuple[int, ...]:
+        """Places of the windows that begin with a state which is known or estimated."""
+        return () if self.part is None else tuple(np.flatnonzero(self.part.opens).tolist())
+
+    @property
+    def moving(self) -> NDArray[np.intp]:
+        """Places of the windows that begin with a state which is estimated."""
+        none = np.zeros(0, np.intp)
+        return none if self.part is None else np.flatnonzero(np.asarray(self.part.begins_moving))
 
 
 class AbstractSource(eqx.Module):

@@ -82,7 +82,7 @@ def check_inputs(
     names: Sequence[str], recordings: Sequence[Recording], source: str
 ) -> tuple[DataWarning, ...]:
     """Warnings ``input_not_recorded`` of inputs that some tests have and others lack."""
-    tests = [each for each in recordings if each.kind != "standstill"]
+    tests = [each for each in recordings if each.kind not in ("standstill", "decay")]
     found = []
     for name in names:
         lack = [each.name for each in tests if name not in each.channels]

@@ -77,6 +77,7 @@ def read_campaign(
             source=path,
             remedy="check the path and its permissions",
         ) from error
+    readings = _with_rests_apart(files, readings)
     _check_unique(files, readings)
     recordings, found = _screen_all(files, the_map.layout, readings)
     reported = tuple(warning for reading in readings for warning in reading.warnings)
@@ -177,6 +178,17 @@ def campaign_files(path: Path) -> list[Path]:
 def is_campaign_file(path: Path) -> bool:
     """Whether a file in a folder has the suffix of a recording."""
     return path.is_file() and path.name.lower().endswith(tuple(s for r in READERS for s in r.suffixes))
+
+
+def _with_rests_apart(files: Sequence[Path], readings: Sequence[Reading]) -> list[Reading]:
+    """The readings of several files, a standstill of which has the name of its file where another has one, too."""
+    still = [each.name for reading in readings for each in reading.recordings if each.kind == "standstill"]
+    found = []
+    for file, reading in zip(files, readings, strict=True):
+        names = {name: f"{name} of {file.name}" for name in still if still.count(name) > 1}
+        renamed = tuple(replace(each, name=names.get(each.name, each.name)) for each in reading.recordings)
+        found.append(replace(reading, recordings=renamed))
+    return found
 
 
 def _check_unique(files: Sequence[Path], readings: Sequence[Reading]) -> None:

@@ -225,7 +225,7 @@ UNKNOWN_LAYOUT = RecordingLayout()
 """Of recordings about which nothing is known."""
 
 
-TestKind = Literal["dwell", "sweep", "road", "step", "standstill", "other"]
+TestKind = Literal["dwell", "sweep", "road", "step", "decay", "standstill", "other"]
 
 
 @dataclass(frozen=True)
@@ -336,6 +336,7 @@ _ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band|multi[ _-]?si
 _STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
 _PULSE = re.compile(r"square|pulse|bump", re.IGNORECASE)
 _STEP = re.compile(r"step", re.IGNORECASE)
+_DECAY = re.compile(r"decay|ring_?down|pluck|release|free_?vibration", re.IGNORECASE)
 _DWELL = re.compile(r"dwell|harmonic|(?<!multi)(?<!multi[ _-])(sine|sinus)", re.IGNORECASE)
 
 
@@ -347,6 +348,8 @@ def classify_test(name: str) -> tuple[TestKind, float | None]:
         return "standstill", None
     if _ROAD.search(name) and not _DWELL.search(name):
         return "road", None
+    if _DECAY.search(name) and not _DWELL.search(name):
+        return "decay", None
     if _PULSE.search(name) and not _DWELL.search(name):
         return "step", None
     found = _FREQUENCY.search(name)

@@ -20,19 +20,26 @@ from savgs_ident.report.theme import BLUE, INK, ORANGE, magnitude_axis, new_figu
 
 def spectra_figure(title: str, compared: Comparison) -> Figure:
     """Draw what a model is held against in windows, and what it misses."""
-    labels = channel_labels(compared.given)
-    residuals = whitened(compared.measured, tuple(labels), compared.model.harmonics, compared.used)
+    labels = {
+        name: shown
+        for name, shown in channel_labels(compared.given).items()
+        if name in compared.measured.channels
+    }
+    places = [c for c, each in enumerate(compared.given.channels) if each.name in labels]
+    residuals = whitened(
+        compared.measured, tuple(labels), compared.model.harmonics[:, places], compared.used[:, places]
+    )
     with styled():
         figure = new_figure(5.25 * len(labels), 8.0)
         grid = figure.subplots(2, len(labels), squeeze=False, height_ratios=(1.25, 0.9))
-        for c, (column, (name, shown)) in enumerate(zip(grid.T, labels.items(), strict=True)):
+        for row, (c, column, (name, shown)) in enumerate(zip(places, grid.T, labels.items(), strict=True)):
             column[0].set_title(shown.title)
             column[0].set_ylabel(f"amplitude, rms over windows [{shown.unit}]")
             _draw_spectra(column[0], compared, c, name, shown.scale)
             magnitude_axis(column[0])
             spacing = compared.measured.spacing
             order = np.arange(residuals.shape[2])
-            draw_residuals(column[1], np.outer(spacing, order), residuals[:, c])
+            draw_residuals(column[1], np.outer(spacing, order), residuals[:, row])
             column[1].set_xlabel("frequency [Hz]")
         share_legends(figure, title, grid[-1, 0])
         return figure

@@ -1,6 +1,6 @@
 """The channels of a test at even instants, all at the same, as a window of it is cut."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 
@@ -25,6 +25,9 @@ RESTING = 1e-3
 LEAST_SAMPLES = 2.5
 """Samples in a period of the highest frequency that is compared, at least."""
 
+DECAY_LEAST = 0.25
+"""A decay may be that much shorter than other tests [1]: it is compared from its first sample on."""
+
 _RATE_HZ = 1000.0
 _FEWEST = 10
 _NOISY = 8.0
@@ -44,6 +47,7 @@ class EvenRecord:
         noise: standard deviation of each channel's noise at one instant [its unit], which neighbours share where the
             channel has fewer samples than there are instants; the amplitudes have as much of it as if they did not.
         rest: at its beginning it has to rest so long to be taken for one that rested before [s].
+        decays: whether nothing drives the plant in it, which was set in motion before.
         before: how much of it is rest before the test began [s].
     """
 
@@ -55,6 +59,7 @@ class EvenRecord:
     gaps: dict[str, list[tuple[float, float]]]
     noise: dict[str, float]
     rest: float
+    decays: bool = False
     before: float = 0.0
 
     @property
@@ -69,7 +74,9 @@ class EvenRecord:
 
     @property
     def begins_at_rest(self) -> bool:
-        """Whether no channel shows anything but noise at the beginning."""
+        """Whether no channel shows anything but noise at the beginning, and the plant was not held there."""
+        if self.decays:
+            return False
         beginning = ceil(self.rest * self.rate)
         return all(
             np.ptp(each[:beginning]) <= max(RESTING * np.ptp(each), _NOISY * self.noise[name])
@@ -95,7 +102,7 @@ class EvenRecord:
 def even_record(
     source: str,
     recording: Recording,
-    driven: str,
+    inputs: Sequence[str],
     names: Collection[str],
     still: dict[str, float],
     least_s: float,
@@ -104,9 +111,11 @@ def even_record(
 ) -> EvenRecord | DataWarning:
     """The channels of a test at even instants, or why it cannot be used.
 
-    It has to be ``least_s`` [s] long, and its channels sampled for what is compared up to ``highest_hz`` [Hz];
-    ``still`` is the noise of channels at rest, where it is known; ``time_scale`` that of the plant [1].
+    It has to be ``least_s`` [s] long, a decay a quarter of that, and its channels sampled for what is compared up to
+    ``highest_hz`` [Hz]; the first of the ``inputs`` has to move, but for a decay. ``still`` is the noise of channels
+    at rest, where it is known; ``time_scale`` that of the plant [1].
     """
+    driven = inputs[0]
 
     def refuse(what: str, remedy: str) -> DataWarning:
         return DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
@@ -118,13 +127,17 @@ def even_record(
         if channel is not None and known is not None and np.count_nonzero(known) >= _FEWEST:
             time, first = np.unique(channel.time[known], return_index=True)
             usable[name] = time, channel.values[known][first]
-    if driven not in usable:
+    decays = recording.kind == "decay" and bool(usable)
+    if driven not in usable and not decays:
         return refuse(f"{driven} was not recorded", "map its channel, or leave this test out")
-    if np.ptp(usable[driven][1]) == 0.0:
-        return refuse(f"{driven} does not move", "name this test a standstill")
+    if not decays and np.ptp(usable[driven][1]) == 0.0:
+        return refuse(
+            f"{driven} does not move",
+            "name this test a standstill, or a decay if it shows how the plant comes to rest",
+        )
     start = max(time[0] for time, _ in usable.values())
     end = min(time[-1] for time, _ in usable.values())
-    if end - start < least_s:
+    if end - start < least_s * (DECAY_LEAST if decays else 1.0):
         return refuse(
             f"its channels overlap for {max(end - start, 0.0):.2g} s", "look at the clocks of the channels"
         )
@@ -138,13 +151,44 @@ def even_record(
     rate = min(max(rates.values()), _RATE_HZ / time_scale)
     instants = start + np.arange(floor((end - start) * rate) + 1) / rate
     even = {name: _at(instants, *each) for name, each in usable.items()}
+    if decays:
+        even |= {name: _resting(even.get(name), instants) for name in inputs}
     noise = {
         name: (still.get(name) or roughness(values))
         * max(1.0, rate * (time[-1] - time[0]) / time.size) ** 0.5
         for name, (time, values) in usable.items()
     }
     gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
-    return EvenRecord(recording.name, start, rate, rates[last], even, gaps, noise, REST_S * time_scale)
+    lacking = set(even) - set(usable)
+    noise |= dict.fromkeys(lacking, 0.0)
+    gaps |= {name: [] for name in lacking}
+    found = EvenRecord(
+        recording.name, start, rate, rates[last], even, gaps, noise, REST_S * time_scale, decays
+    )
+    return _let_go(found) if decays else found
+
+
+def _let_go(held: EvenRecord) -> EvenRecord:
+    """A decay from where the plant is let go: before that something holds it which nobody recorded."""
+    moves = [
+        np.abs(each - each[0]) > max(RESTING * np.ptp(each), _NOISY * held.noise[name])
+        for name, each in held.values.items()
+    ]
+    first = int(np.argmax(np.any(moves, axis=0)))
+    before = first / held.rate
+    if before < held.rest:
+        return held
+    return replace(
+        held,
+        start=held.start + before,
+        values={name: each[first:] for name, each in held.values.items()},
+        gaps={name: [(a - before, b - before) for a, b in each] for name, each in held.gaps.items()},
+    )
+
+
+def _resting(recorded: Array | None, instants: Array) -> Array:
+    """An input of a decay, at its mean: what it shows is noise. Of one that was not recorded that is zero."""
+    return np.full(instants.size, 0.0 if recorded is None else np.mean(recorded))
 
 
 def _at(instants: Array, time: Array, values: Array) -> Array:

@@ -28,7 +28,10 @@ class ComparedPart(NamedTuple):
         begin: phase at which it begins [rad], (D,).
         end: phase at which it ends [rad], (D,).
         every: from one order of the readings to the next, in orders of the test [1], (D,).
-        begins_at_rest: 1 where the plant rested when the window began, 0 where nobody knows how it moved [1], (D,).
+        begins_at_rest: 1 where the plant rested when the window began, 0 elsewhere [1], (D,).
+        begins_moving: 1 where the state with which the window begins is estimated, 0 elsewhere [1], (D,).
+
+    How the motion began in a window that begins neither way nobody knows, and it is forgotten.
 
     Of a window it is a part. Of a dwell beside windows it begins so long before the period and ends so long after it
     (:data:`WHOLE_PERIOD`) that every instant counts alike, and every order is compared.
@@ -38,6 +41,12 @@ class ComparedPart(NamedTuple):
     end: NDArray[np.float64]
     every: NDArray[np.float64]
     begins_at_rest: NDArray[np.float64]
+    begins_moving: NDArray[np.float64]
+
+    @property
+    def opens(self) -> NDArray[np.bool_]:
+        """Which of the tests begin with a state that is known or estimated, (D,): they do not lead back to it."""
+        return self.begins_at_rest + self.begins_moving > 0.0
 
     @property
     def repeats(self) -> NDArray[np.bool_]:
@@ -45,8 +54,26 @@ class ComparedPart(NamedTuple):
         return self.end - self.begin > 2.0 * np.pi
 
 
-WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0, 0.0)))
+WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0, 0.0, 0.0)))
 """That of one dwell."""
+
+
+@dataclass(frozen=True)
+class Beginnings:
+    """The states with which D tests begin, where they are estimated, and what others would change in C channels.
+
+    Attributes:
+        states: of the plant, (D, m), in SI; zero for tests of which none is estimated.
+        changes: of the harmonics by one unit of each state [unit of the channel per SI unit], (D, C, K, m), channels
+            in the order of the plant's.
+    """
+
+    states: NDArray[np.float64]
+    changes: NDArray[np.complex128]
+
+    def of_tests(self, kept: NDArray[np.integer]) -> "Beginnings":
+        """Of some of the tests, by their places."""
+        return Beginnings(self.states[kept], self.changes[kept])
 
 
 @dataclass(frozen=True)
@@ -76,6 +103,7 @@ class HarmonicResponse:
             times the reading, at every so many-th order; those of inputs are not. None where all tests are dwells.
         beside: mean of what was recorded beside the plant's channels in each test [its unit], (D,) by name; NaN
             where it was not.
+        beginnings: the states with which tests begin that do not begin at rest; None where none is estimated.
     """
 
     tests: tuple[str, ...]
@@ -94,6 +122,7 @@ class HarmonicResponse:
     recorded: NDArray[np.float64] | None = None
     part: ComparedPart | None = None
     beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    beginnings: Beginnings | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

@@ -38,20 +38,33 @@ NUMBERS = 1200
 
 
 class Cut(NamedTuple):
-    """What is compared in a window: so much [s] of a record, up to an ``end`` [s after its beginning]."""
+    """What is compared in a window: so much [s] of a record, up to an ``end`` [s after its beginning].
+
+    After a ``lead`` [s]; without one the window begins with its record, with a state that is to be estimated.
+    """
 
     record: EvenRecord
     end: float
     compared: float
+    lead: float
 
 
 @dataclass(frozen=True)
 class _Window:
-    """One window: the even record, the place of its first instant in it, and how much of it is compared [s]."""
+    """One window: the even record, the place of its first instant in it, and how much of it is compared [s].
+
+    That is after a ``lead`` [s].
+    """
 
     record: EvenRecord
     first: int
     compared: float
+    lead: float
+
+    @property
+    def begins_moving(self) -> bool:
+        """Whether nothing leads up to what is compared."""
+        return self.lead == 0.0
 
     @property
     def begins_at_rest(self) -> bool:
@@ -61,10 +74,9 @@ class _Window:
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of one length [s], of which a part is compared, after a lead [s], of a plant with a time scale [1]."""
+    """Windows of one length [s], of each of which a part is compared, of a plant with a time scale [1]."""
 
     length: float
-    lead: float
     windows: tuple[_Window, ...]
     time_scale: float
 
@@ -74,20 +86,21 @@ class Windows:
         return min(IMPOSED_HZ / self.time_scale, 0.45 * min(each.record.slowest for each in self.windows))
 
     @classmethod
-    def of(cls, cut: Sequence[Cut], lead: float, time_scale: float) -> "Windows":
-        """The windows of what is cut, each after a ``lead`` [s]."""
+    def of(cls, cut: Sequence[Cut], time_scale: float) -> "Windows":
+        """The windows of what is cut."""
         closing = CLOSING_S * time_scale
-        length = lead + max(each.compared for each in cut) + closing
+        length = max(each.lead + each.compared for each in cut) + closing
         windows = []
-        for record, end, compared in cut:
+        for record, end, compared, lead in cut:
             last = min(round(end * record.rate), record.count - 1)
             first = last - round((lead + compared) * record.rate)
-            windows.append(_Window(record, max(first, round(closing * record.rate)), compared))
-        return cls(length, lead, tuple(windows), time_scale)
+            least = round(closing * record.rate) if lead else 0
+            windows.append(_Window(record, max(first, least), compared, lead))
+        return cls(length, tuple(windows), time_scale)
 
     def part(self, window: _Window) -> tuple[float, float]:
         """Between these phases a window is compared [rad]."""
-        begin, end = self.lead, self.lead + window.compared
+        begin, end = window.lead, window.lead + window.compared
         return 2.0 * np.pi * begin / self.length, 2.0 * np.pi * end / self.length
 
     def response(
@@ -130,7 +143,11 @@ class Windows:
             warnings=warnings,
             part=ComparedPart(
                 *np.array(
-                    [(*self.part(each), every, each.begins_at_rest) for each in self.windows], np.float64
+                    [
+                        (*self.part(each), every, each.begins_at_rest, each.begins_moving)
+                        for each in self.windows
+                    ],
+                    np.float64,
                 ).T
             ),
         )
@@ -147,7 +164,7 @@ class Windows:
             channel = recordings[window.record.test].get(name)
             if channel is None:
                 return np.nan
-            begin = window.record.start + window.first / window.record.rate + self.lead
+            begin = window.record.start + window.first / window.record.rate + window.lead
             here = (channel.time >= begin) & (channel.time <= begin + window.compared)
             known = channel.values[here & np.isfinite(channel.values)]
             return float(known.mean()) if known.size else np.nan
@@ -156,7 +173,7 @@ class Windows:
 
     def _begin(self, window: _Window) -> float:
         """Where what is compared in a window begins [s after its test did]."""
-        return window.first / window.record.rate + self.lead - window.record.before
+        return window.first / window.record.rate + window.lead - window.record.before
 
     def _name(self, window: _Window) -> str:
         # Rounded to what is printed, and no negative zero.

@@ -6,9 +6,12 @@ A rig forgets how a motion began. So each window begins some seconds before what
 more for a plant that rings), and at its end its inputs are led over, in :data:`CLOSING_S`, to what they were before
 it began. In such a window the inputs repeat, and the periodic motion that they lead to is the recorded one in what is
 compared, wherever the recorded one came from: no state at the beginning has to be estimated. A test that
-begins at rest is compared from its beginning, for before it the rig rested: there the state is known. Where a rig
-forgets nothing, as one that sticks from step to step, such a test is one window, as long as it is
-(:func:`estimate_whole_tests`).
+begins at rest is compared from its beginning, for before it the rig rested: there the state is known.
+
+Some tests do not last until their beginning is forgotten: those of a rig that forgets nothing, as one that sticks
+from step to step, short ones, and those in which the rig is released and left alone, where all that there is to see
+is how it forgets. Each of them is one window, from its beginning (:func:`estimate_whole_tests`); where it does not
+begin at rest, the state with which it begins is estimated (:mod:`savgs_ident.inference.beginnings`).
 
 What is compared are complex amplitudes of the readings, weighted in time by a share that is zero outside that part
 (:func:`savgs_ident.responses.harmonic_response.compared_share`), recorded and predicted alike:
@@ -37,10 +40,10 @@ from savgs_ident.responses.window_amplitudes import CLOSING_S, HIGHEST_HZ, IMPOS
 
 Array = NDArray[np.float64]
 
-KINDS: tuple[TestKind, ...] = ("road", "sweep", "step", "other")
+KINDS: tuple[TestKind, ...] = ("road", "sweep", "step", "decay", "other")
 """The kinds of test that are cut into windows."""
 
-BESIDE_DWELLS: tuple[TestKind, ...] = ("road", "step")
+BESIDE_DWELLS: tuple[TestKind, ...] = ("road", "step", "decay")
 """Those of them that are where there are dwells: there a sweep is kept to see what is predicted of it."""
 
 LEAD_S = 3.0
@@ -92,14 +95,16 @@ def estimate_windows(
     first = lead + tests.closing
     if tests.need_no_cut(COMPARED * lead * _NEAR):
         return _whole(tests)
-    found = [each.rested(first) if each.begins_at_rest else each for each in tests.records]
+    driven = [each for each in tests.records if not each.decays]
+    found = [each.rested(first) if each.begins_at_rest else each for each in driven]
     compared = _compared_s([each.duration - first for each in found], COMPARED * lead, tests.least)
     if compared == 0.0:
-        raise _no_window(campaign, found, tests.warnings, first + tests.least)
-    short = (each for each in found if each.duration - first < compared)
-    warnings = [_too_short(campaign.source, each, first + compared) for each in short]
-    cut = [Cut(each, end, compared) for each in found for end in _ends(each.duration, first, compared)]
-    return tests.response(cut, lead, warnings)
+        return _whole(tests)
+    cut = [Cut(each, end, compared, lead) for each in found for end in _ends(each.duration, first, compared)]
+    short = [each for each in found if each.duration - first < compared]
+    decays = [each for each in tests.records if each.decays]
+    cut += [_from_its_beginning(each, lead + compared, lead) for each in (*short, *decays)]
+    return tests.response(cut)
 
 
 def estimate_whole_tests(
@@ -110,34 +115,28 @@ def estimate_whole_tests(
     kinds: Collection[TestKind] = KINDS,
     time_scale: float = 1.0,
 ) -> HarmonicResponse:
-    """The same of the tests that begin at rest, each in one window from its beginning to its end.
+    """The same of all tests, each in one window from its beginning to its end.
 
-    For a plant that forgets nothing. Of each :data:`WHOLE_S` are compared at most. Raises :class:`InputError` also
-    where no test begins at rest.
+    For a plant that forgets nothing. Of each :data:`WHOLE_S` are compared at most.
     """
     return _whole(_Tests.of(campaign, inputs, readings, highest_hz, kinds, time_scale))
 
 
 def _whole(tests: "_Tests") -> HarmonicResponse:
-    source, lead, longest = tests.campaign.source, LEAD_S * tests.time_scale, WHOLE_S * tests.time_scale
-    rested = [each.rested(lead + tests.closing) for each in tests.records if each.begins_at_rest]
-    if not rested:
-        raise InputError(
-            "no test begins at rest",
-            source=source,
-            remedy="let each test begin with a second of rest",
-        )
-    warnings = [_begins_moving(source, each) for each in tests.records if not each.begins_at_rest]
-    lasting = [min(each.duration - each.before, longest) for each in rested]
-    warnings += [
-        _shortened(source, each, longest)
-        for each, compared in zip(rested, lasting, strict=True)
-        if compared < each.duration - each.before
+    if not tests.records:
+        raise _no_test(tests.campaign, tests.warnings)
+    lead, longest = LEAD_S * tests.time_scale, WHOLE_S * tests.time_scale
+    warnings = [
+        _shortened(tests.campaign.source, each, longest) for each in tests.records if each.duration > longest
     ]
-    cut = [
-        Cut(each, each.before + compared, compared) for each, compared in zip(rested, lasting, strict=True)
-    ]
-    return tests.response(cut, lead, warnings)
+    rested = [each.rested(lead + tests.closing) if each.begins_at_rest else each for each in tests.records]
+    return tests.response([_from_its_beginning(each, longest, lead) for each in rested], warnings)
+
+
+def _from_its_beginning(record: EvenRecord, longest: float, lead: float) -> Cut:
+    """A record from its beginning on, so much of it at most [s]; where there was rest before it, after a lead [s]."""
+    compared = min(record.duration - record.before, longest)
+    return Cut(record, record.before + compared, compared, lead if record.before else 0.0)
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,7 @@ class _Tests:
         still, warnings = estimate_standstill_noise(campaign)
         found = [
             even_record(
-                campaign.source, each, inputs[0], names, still, LEAST_S * time_scale, highest, time_scale
+                campaign.source, each, inputs, names, still, LEAST_S * time_scale, highest, time_scale
             )
             for each in tests
         ]
@@ -205,10 +204,8 @@ class _Tests:
             each.begins_at_rest and self.least <= each.duration <= longest_s for each in self.records
         )
 
-    def response(
-        self, cut: Sequence[Cut], lead_s: float, warnings: Sequence[DataWarning]
-    ) -> HarmonicResponse:
-        """What is compared in windows, after a lead [s], with further warnings."""
+    def response(self, cut: Sequence[Cut], warnings: Sequence[DataWarning] = ()) -> HarmonicResponse:
+        """What is compared in windows, with further warnings."""
         here = [each.record for each in cut]
         assumed = [
             name
@@ -218,7 +215,7 @@ class _Tests:
         told = (*self.warnings, *warnings)
         if assumed:
             told += (_noise_assumed(self.campaign.source, assumed),)
-        windows = Windows.of(cut, lead_s, self.time_scale)
+        windows = Windows.of(cut, self.time_scale)
         names = (*self.inputs, *self.readings)
         channels = tuple(name for name in names if any(name in each.values for each in here))
         response = replace(
@@ -300,39 +297,16 @@ def _ends(duration: float, first: float, compared: float) -> list[float]:
     return [duration - place * compared for place in reversed(range(_count(duration - first, compared)))]
 
 
-def _too_short(source: str, even: EvenRecord, needed: float) -> DataWarning:
-    return _not_used(
-        source,
-        even,
-        f"has {even.duration - even.before:.3g} s, the windows of this campaign need {needed:.3g} s",
-        "give it as a campaign of its own, or record a longer one or one that begins at rest",
-    )
-
-
-def _begins_moving(source: str, even: EvenRecord) -> DataWarning:
-    what = "does not begin at rest, and the model remembers how its motion began"
-    return _not_used(source, even, what, "let each test begin with a second of rest")
-
-
 def _shortened(source: str, even: EvenRecord, longest: float) -> DataWarning:
     what = f"is compared in its first {longest:g} s only, for the model remembers how its motion began"
-    return _not_used(source, even, what, "cut it into tests that begin at rest")
+    return _not_used(source, even, what, "cut it into several tests")
 
 
 def _not_used(source: str, even: EvenRecord, what: str, remedy: str) -> DataWarning:
     return DataWarning("window_not_used", what, source, even.test, remedy=remedy)
 
 
-def _no_window(
-    campaign: Campaign, found: list[EvenRecord], warnings: tuple[DataWarning, ...], least: float
-) -> InputError:
-    if found:
-        longest = max(each.duration - each.before for each in found)
-        return InputError(
-            f"the longest test has {longest:.3g} s, {least:.3g} s are needed",
-            source=campaign.source,
-            remedy="record a longer one, for the motion has to forget how it began; or one that begins at rest",
-        )
+def _no_test(campaign: Campaign, warnings: tuple[DataWarning, ...]) -> InputError:
     warnings = (*warnings, *campaign.left_out)
     if not warnings:
         return InputError(

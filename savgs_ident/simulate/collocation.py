@@ -18,9 +18,9 @@ with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrice
 Such recurrences are solved dwell by dwell (:func:`factorise_recurrence`, :func:`solve_recurrence`). Eliminating from
 node to node is stable because a rig forgets its past (the products of M_n shrink). Products are formed in chunks, all
 chunks of all dwells at a time, then over the chunks of a dwell; the period closes with
-(I - M_{N-1} ... M_0) x_0 = d. A window that begins at rest does not close: with M_{N-1} = 0 and d_{N-1} = 0 its first
-state stays as it is. The factorisation serves any number of right sides, which is what makes sensitivities
-cheap.
+(I - M_{N-1} ... M_0) x_0 = d. A window that begins with a given state does not close: with M_{N-1} = 0 and
+d_{N-1} = 0 its first state stays as it is. The factorisation serves any number of right sides, which is what makes
+sensitivities cheap.
 
 Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
 a long vector.
@@ -99,8 +99,8 @@ def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> 
 
 
 def _opened(layout: Layout, values: Float[Array, "*k P"]) -> Float[Array, "*k P"]:
-    """Nothing leads from the last node of a window that begins at rest to its first."""
-    return values.at[..., layout.loose_ends].set(0.0) if layout.begins_at_rest else values
+    """Nothing leads from the last node of a window that begins with a given state to its first."""
+    return values.at[..., layout.loose_ends].set(0.0) if layout.opened else values
 
 
 def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
@@ -126,6 +126,11 @@ def solve_recurrence(
 
     States keep the units of the right sides.
     """
+    return _solve_opened(layout, factors, _opened(layout, right))
+
+
+def _solve_opened(layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]) -> Float[Array, "m P"]:
+    """The same, where what stands at the last node of a window that does not close is how it begins."""
 
     def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
         return apply_nodes(step[0], x) + step[1], None
@@ -133,7 +138,7 @@ def solve_recurrence(
     def pass_on(x: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
         return apply_nodes(step[0], x) + step[1], x
 
-    right, size = _opened(layout, right), right.shape[0]
+    size = right.shape[0]
     inside = (by_chunks(factors.steps), by_chunks(right))
     sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
     over = (
@@ -289,3 +294,13 @@ def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance:
     """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes, all in SI."""
     dx = apply_nodes(lin.inverse, solve_recurrence(layout, lin.factors, defects))
     return Trajectory(dx, imbalance + apply_nodes(lin.slope, dx))
+
+
+def begun_otherwise(layout: Layout, lin: Linearised, change: Float[Array, "m D"]) -> Trajectory:
+    """Changes (dx, dy) of windows that begin with a given state, by a ``change`` of that state [SI]; others stay."""
+    opened, first = list(layout.opened), layout.starts[list(layout.opened)]
+    inverse = jnp.moveaxis(lin.inverse[:, :, first], -1, 0)
+    begun = jnp.linalg.solve(inverse, change[:, opened].T[..., None])[..., 0].T
+    right = jnp.zeros((change.shape[0], layout.total)).at[:, layout.loose_ends].set(begun)
+    dx = apply_nodes(lin.inverse, _solve_opened(layout, lin.factors, right))
+    return Trajectory(dx, apply_nodes(lin.slope, dx))

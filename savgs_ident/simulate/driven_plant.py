@@ -42,8 +42,12 @@ def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
 
 
 def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
-    """Whether a model is held against the force of its drive along the motions of a campaign."""
-    return is_driven(model.plant) and not campaign.of_kind("dwell") and bool(_reading(model.plant))
+    """Whether a model is held against the force of its drive along the motions of a campaign.
+
+    Not where there are dwells, whose response it predicts, or decays, which no drive drives.
+    """
+    predicted = campaign.of_kind("dwell") or campaign.of_kind("decay")
+    return is_driven(model.plant) and not predicted and bool(_reading(model.plant))
 
 
 def motion_in(campaign: Campaign, model: Model) -> DrivenMotion | None:

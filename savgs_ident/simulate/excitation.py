@@ -109,21 +109,29 @@ def _interpolate(
 
 
 def motion_scale(
-    model: AbstractPlant, signals: tuple[InputSignal, ...], frequency: Float[Array, " D"], layout: Layout
+    model: AbstractPlant, signals: tuple[InputSignal, ...], excitation: Excitation, layout: Layout
 ) -> Float[Array, "m P"]:
-    """A typical size of every state [its unit] at the dwells' frequencies [Hz], from the amplitudes of the inputs."""
+    """A typical size of every state [its unit] in each test, from the amplitudes of its inputs.
+
+    Where a test begins moving, from the sizes of the plant besides: inputs may rest there.
+    """
+    moving = 0.0 if excitation.part is None else excitation.part.begins_moving
     amplitudes, speeds = (
         [_amplitude(each, layout) for each in listed] for listed in zip(*signals, strict=True)
     )
     sizes = [
-        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True))
-        for i in range(len(model.coordinates))
+        sum(
+            abs(given.moves[i]) * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True)
+        )
+        + moving * each.size
+        for i, each in enumerate(model.coordinates)
     ]
     rates = [
-        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, speeds, strict=True))
-        for i in range(len(model.coordinates))
+        sum(abs(given.moves[i]) * amplitude for given, amplitude in zip(model.inputs, speeds, strict=True))
+        + moving * each.rate_size
+        for i, each in enumerate(model.coordinates)
     ]
-    states = [jnp.full_like(frequency, state.scale) for state in model.states]
+    states = [jnp.full_like(excitation.frequency, state.scale) for state in model.states]
     return jnp.stack([*sizes, *rates, *states])[:, layout.dwell]
 
 
@@ -229,7 +237,8 @@ def measured_excitation(
         for each, mean in zip(plant.inputs, kept, strict=True)
     }
     part = None if measured.part is None else cast(Any, ComparedPart)(*map(jnp.asarray, measured.part))
-    return Excitation(jnp.asarray(measured.frequency), harmonics, part)
+    begun = None if measured.beginnings is None else jnp.asarray(measured.beginnings.states)
+    return Excitation(jnp.asarray(measured.frequency), harmonics, part, begun)
 
 
 def means_that_count(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> tuple[bool, ...]:
@@ -251,7 +260,9 @@ def only_driven(excitation: Excitation, kept: NDArray[np.intp]) -> Excitation:
     if part.repeats.all():
         few = {name: _that_move(each) for name, each in harmonics.items()}
         return Excitation(excitation.frequency[kept], few)
-    return Excitation(excitation.frequency[kept], harmonics, cast(Any, ComparedPart)(*map(jnp.asarray, part)))
+    begun = None if excitation.beginnings is None else excitation.beginnings[kept]
+    windows = cast(Any, ComparedPart)(*map(jnp.asarray, part))
+    return Excitation(excitation.frequency[kept], harmonics, windows, begun)
 
 
 def _that_move(harmonics: Array) -> Array:
@@ -396,7 +407,7 @@ def _with_inputs(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant])
     kept = tuple(
         each
         for each in campaign.recordings
-        if each.kind == "standstill" or all(name in each.channels for name in known)
+        if each.kind in ("standstill", "decay") or all(name in each.channels for name in known)
     )
     return replace(campaign, recordings=kept)
 

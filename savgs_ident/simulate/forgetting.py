@@ -63,7 +63,7 @@ def forgetful_motion(
     try:
         return _forgetting(response, measured, model, in_windows, progress)
     except InputError as error:
-        whole = _from_rest(measured, model, in_windows, progress)
+        whole = _in_whole_tests(measured, model, in_windows, progress)
         if whole is not None:
             return whole
         if not response.dwells.size:
@@ -101,13 +101,13 @@ def _forgetting(
     return lasting, motion if lasting is response else None
 
 
-def _from_rest(
+def _in_whole_tests(
     measured: Measurements, model: Model, in_windows: _InWindows, progress: Progress
 ) -> tuple[HarmonicResponse, PeriodicSolution | None] | None:
-    """The response of tests that begin at rest, each in one window; None where none can be compared."""
+    """The response of tests from their beginning, each in one window; None where none can be compared."""
     if not isinstance(measured, Campaign):
         return None
-    progress("comparing whole tests, from rest: the model remembers how a motion began")
+    progress("comparing whole tests: the model remembers how a motion began")
     try:
         response = in_windows(estimate_whole_tests)
         if response.part is None:
@@ -120,9 +120,9 @@ def _from_rest(
 
 
 def _begun(response: HarmonicResponse) -> NDArray[np.bool_]:
-    """Which of the windows do not begin at rest, (w,)."""
+    """Which of the windows begin with a state that is to be forgotten, (w,)."""
     assert response.part is not None
-    return np.asarray(response.part.begins_at_rest[response.windows] == 0.0)
+    return ~response.part.opens[response.windows]
 
 
 def _left(
@@ -139,7 +139,7 @@ def _left(
 
     def after(upto: NDArray[np.float64]) -> NDArray[np.float64]:
         left = remembered(solution, upto)
-        # Where a motion began at rest, how it began is known; there may be none all the same.
+        # Where it is known or estimated how a motion began, there may be none all the same.
         return np.where(begun | ~np.isfinite(left), left, 0.0)
 
     return after(begin), after(0.5 * begin), solution
@@ -154,13 +154,13 @@ def _longer(time_scale: float, half: float, left: float) -> float:
     rate = np.log(half / left) / (0.5 * lead) if np.isfinite([half, left]).all() else 0.0
     longer = lead + np.log(left / (ENDURED * REMEMBERED)) / rate if rate > 0.0 else np.inf
     if longer > longest:
-        what = (
-            "does not forget how a motion began"
-            if np.isfinite(left)
-            else "does not follow the recorded motion"
-        )
+        if not np.isfinite(left):
+            raise InputError(
+                "no motion of the model was found in half of the windows or more",
+                remedy="mend the parameters of the model, and look at the units of the inputs",
+            )
         raise InputError(
-            f"the model {what}: {longest:g} s before what is compared would not do",
+            f"the model does not forget how a motion began: {longest:g} s before what is compared would not do",
             remedy="give the plant the damping that it has, or record tests that begin with a second of rest",
         )
     return float(longer)
@@ -182,18 +182,25 @@ def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicR
         )
     gone = response.windows[~forgotten]
     warnings = tuple(
-        DataWarning(
-            "window_remembers",
-            f"is left out: the model remembers {100.0 * share:.2g} % of how the motion in it began",
-            test=response.tests[d],
-            remedy="let the plant move for some seconds before what matters",
-        )
-        for d, share in zip(gone, left[~forgotten], strict=True)
+        _left_out(response.tests[d], share) for d, share in zip(gone, left[~forgotten], strict=True)
     )
     if not gone.size:
         return response
     kept = np.setdiff1d(np.arange(len(response.tests)), gone)
     return replace(only_tests(response, kept), warnings=(*response.warnings, *warnings))
+
+
+def _left_out(test: str, share: float) -> DataWarning:
+    """Why a window is not used of whose beginning so much is left [1]: infinite where there is no motion."""
+    if not np.isfinite(share):
+        what = "is left out: no motion of the model was found in it"
+        return DataWarning("window_not_solved", what, test=test, remedy="mend the parameters of the model")
+    return DataWarning(
+        "window_remembers",
+        f"is left out: the model remembers {100.0 * share:.2g} % of how the motion in it began",
+        test=test,
+        remedy="let the plant move for some seconds before what matters",
+    )
 
 
 def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -112,7 +112,7 @@ def _held(
     """The states of each test where they follow their bounds; else what does, over the second of two periods.
 
     ``steps`` [s] from node to node are those on a time scale of 1.
-    Those of a window that begins at rest begin without stretch.
+    Those of a window that begins with a given state begin without stretch.
     """
     layout, middle = mesh.layout, 0.5 * (lower + upper)
     step = steps[layout.preceding]
@@ -128,8 +128,8 @@ def _held(
     def in_time(values: Array) -> Array:
         return jnp.moveaxis(values[..., nodes], -2, 0)
 
-    rested = list(layout.begins_at_rest)
-    firsts = layout.starts[rested]
+    opened = list(layout.opened)
+    firsts = layout.starts[opened]
     before = states[:, layout.preceding].at[:, firsts].set(states[:, firsts])
     follows, _ = advance(before, (lower, upper, middle, step))
     off = over_dwells(jnp.max(jnp.abs(states - follows) / (upper - lower), axis=0), layout)
@@ -137,7 +137,7 @@ def _held(
     along = (*map(in_time, (lower, upper, middle)), jnp.where(present, step[nodes], 0.0))
     # What never slides creeps to where its stretch is nothing in the mean over time.
     begun, _ = jax.lax.scan(advance, _means(middle, steps, layout), along)
-    begun = begun.at[:, rested].set(0.0)
+    begun = begun.at[:, opened].set(0.0)
     every: Array = jax.lax.scan(advance, begun, along)[1]
     anew = every[np.arange(layout.total) - layout.starts[layout.dwell], :, layout.dwell].T
     return jnp.where((off < FOLLOWS)[layout.dwell], states, anew)

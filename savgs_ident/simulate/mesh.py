@@ -32,11 +32,11 @@ class Layout:
 
     Attributes:
         counts: nodes of each.
-        begins_at_rest: windows that do: their last node does not lead back to the first, whose state is known.
+        opened: windows whose last node does not lead back to the first: they begin with a given state.
     """
 
     counts: tuple[int, ...]
-    begins_at_rest: tuple[int, ...] = ()
+    opened: tuple[int, ...] = ()
 
     @property
     def total(self) -> int:
@@ -74,13 +74,13 @@ class Layout:
 
     @property
     def loose_ends(self) -> NDArray[np.intp]:
-        """The last nodes of the windows that begin at rest."""
-        places = list(self.begins_at_rest)
+        """The last nodes of the windows that begin with a given state."""
+        places = list(self.opened)
         return self.starts[places] + np.asarray(self.counts)[places] - 1
 
     def finer(self, times: int) -> "Layout":
         """So many times as many nodes."""
-        return Layout(tuple(times * count for count in self.counts), self.begins_at_rest)
+        return Layout(tuple(times * count for count in self.counts), self.opened)
 
     @cached_property
     def chunk_table(self) -> NDArray[np.intp]:
@@ -175,8 +175,8 @@ def only_dwells(mesh: Mesh, dwells: Sequence[int] | NDArray[np.intp]) -> Mesh:
     """The nodes of some of the dwells."""
     nodes = mesh.layout.nodes_of(dwells)
     places = [int(d) for d in dwells]
-    rested = tuple(here for here, d in enumerate(places) if d in mesh.layout.begins_at_rest)
-    layout = Layout(tuple(mesh.layout.counts[d] for d in places), rested)
+    opened = tuple(here for here, d in enumerate(places) if d in mesh.layout.opened)
+    layout = Layout(tuple(mesh.layout.counts[d] for d in places), opened)
     return Mesh(layout, *(np.asarray(each)[nodes] for each in mesh[1:]))
 
 

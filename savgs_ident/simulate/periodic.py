@@ -174,7 +174,7 @@ def layout_of(excitation: Excitation, settings: PeriodicSettings, model: Abstrac
     counts = np.array(layout_for(frequency, settings.nodes, settings.slow).counts)
     windows = excitation.windows
     counts[windows] = CHUNK * np.ceil(settings.window_rate / frequency[windows] / CHUNK)
-    return Layout(tuple(counts.tolist()), excitation.begins_at_rest)
+    return Layout(tuple(counts.tolist()), excitation.opened)
 
 
 class PeriodicSolution(eqx.Module):
@@ -243,7 +243,7 @@ def _solve(
 ) -> tuple[Array, ...]:
     signals, turning = signals_at(model, excitation, mesh)
     layout, steps = mesh.layout, node_steps(excitation, mesh)
-    scale = motion_scale(model, signals, excitation.frequency, layout)
+    scale = motion_scale(model, signals, excitation, layout)
     u = model.drive(signals, turning)
     result = solve_newton(model, p, prepared, start, u, layout, steps, scale, limit, enough)
     return tuple(jax.tree.leaves(result))
@@ -292,17 +292,26 @@ def _with_windows_marched(
     """The start of all tests, that of the windows followed in time from their first instant."""
     windows = excitation.windows
     theirs, nodes = only_dwells(mesh, windows), mesh.layout.nodes_of(windows)
-    rested = mesh.layout.starts[list(mesh.layout.begins_at_rest)]
-    if rested.size:
-        start = start._replace(x=_resting(model, p, excitation, mesh, start.x, rested))
+    opened = mesh.layout.starts[list(mesh.layout.opened)]
+    if opened.size:
+        start = start._replace(x=_resting(model, p, excitation, mesh, start.x, opened))
+    start = with_beginnings(start, excitation, mesh.layout)
     first = start.x[:, mesh.layout.starts[windows]]
     marched = march(model, p, model.prepare(p), only_driven(excitation, windows), theirs, first)
     return Trajectory(
         *(
-            known.at[:, nodes].set(new).at[:, rested].set(known[:, rested])
+            known.at[:, nodes].set(new).at[:, opened].set(known[:, opened])
             for known, new in zip(start, marched, strict=True)
         )
     )
+
+
+def with_beginnings(at: Trajectory, excitation: Excitation, layout: Layout) -> Trajectory:
+    """A trajectory with the states with which tests begin that do not begin at rest, where they are known."""
+    if excitation.beginnings is None:
+        return at
+    places, count = excitation.moving, excitation.beginnings.shape[1]
+    return at._replace(x=at.x.at[:count, layout.starts[places]].set(excitation.beginnings[places].T))
 
 
 @eqx.filter_jit

@@ -21,6 +21,7 @@ from savgs_ident.responses.harmonic_response import ComparedPart
 from savgs_ident.simulate.collocation import (
     Trajectory,
     apply_nodes,
+    begun_otherwise,
     node_motion,
     residual_at_nodes,
     solve_linearised,
@@ -29,7 +30,7 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
+from savgs_ident.simulate.readings import Sensors, harmonics_of, readings_of, sensors_of, shown_by
 
 
 class Directions(NamedTuple):
@@ -239,6 +240,29 @@ def answers(
         return answer
 
     return along
+
+
+@eqx.filter_jit
+def changes_of_beginnings(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int, states: int
+) -> Complex[Array, "D C K m"]:
+    """Changes of the harmonics 0..orders by one unit of each of the first ``states`` with which tests begin.
+
+    They are in the unit of the reading per SI unit of the state; zero for tests of which none is estimated.
+    """
+    at, layout = solution.trajectory, solution.mesh.layout
+    assert solution.excitation.part is not None
+    moving = solution.excitation.part.begins_moving
+
+    def along(state: Array) -> Array:
+        change = jnp.zeros((at.x.shape[0], moving.size)).at[state].set(moving)
+        motions = begun_otherwise(layout, solution.linearised, change)
+        answer: Array = jax.jvp(
+            lambda found: harmonics_of(model, p, found, solution, orders), (at,), (motions,)
+        )[1]
+        return answer
+
+    return jnp.moveaxis(jax.lax.map(along, jnp.arange(states)), 0, -1)
 
 
 def loads_at_nodes(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> Any:

@@ -64,6 +64,14 @@ def test_a_sensor_that_reads_three_per_cent_too_much_is_no_small_error(bench: Be
     assert found.error > BACKGROUND.largest_error
 
 
+@pytest.mark.slow
+def test_noise_of_many_times_what_the_recordings_show_is_none(bench: Bench) -> None:
+    _, found = _fitted(bench, bench.predicted(TRUTH) + 2.0 * bench.noise(4))
+    assert isinstance(found, FitWithErrors)
+    _, found = _fitted(bench, bench.predicted(TRUTH) + 2.0 * BACKGROUND.noisiest * bench.noise(4))
+    assert isinstance(found, LargeErrors)
+
+
 def test_what_did_not_end_has_no_background(bench: Bench) -> None:
     data = bench.predicted(TRUTH)
     best = bench.fit(data)

@@ -238,6 +238,20 @@ def test_the_same_test_in_two_files(
         load_campaign(tmp_path)
 
 
+def test_two_files_may_each_have_a_standstill(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Callable[..., bytes]
+) -> None:
+    for name, test in (("a.csv", "dwell_1Hz"), ("b.csv", "dwell_2Hz")):
+        header, *rows = csv_bytes(signals(), test=test).splitlines(keepends=True)
+        still = csv_bytes(signals(), test="standstill").splitlines(keepends=True)[1:]
+        (tmp_path / name).write_bytes(b"".join([header, *rows, *still]))
+    found = load_campaign(tmp_path)
+    assert [each.name for each in found.of_kind("standstill")] == [
+        "standstill of a.csv",
+        "standstill of b.csv",
+    ]
+
+
 MAPS = {
     "not TOML": ("[channels", "is not TOML"),
     "unknown table": ("[chanels.road_height]\n", "unknown table 'chanels'"),

@@ -47,7 +47,7 @@ def _windows() -> HarmonicResponse:
         peak_to_peak_sd=np.zeros(shape[:2]),
         noise_sd=sd,
         periods=np.ones(WINDOWS, np.int64),
-        part=ComparedPart(*(np.full(WINDOWS, each) for each in (1.5, 6.0, float(EVERY), 0.0))),
+        part=ComparedPart(*(np.full(WINDOWS, each) for each in (1.5, 6.0, float(EVERY), 0.0, 0.0))),
     )
 
 

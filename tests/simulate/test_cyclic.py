@@ -21,8 +21,8 @@ LAYOUTS = (
     Layout((2 * CHUNK, CHUNK)),
     Layout((CHUNK, 3 * CHUNK, 2 * CHUNK)),
     Layout((4 * CHUNK, CHUNK, CHUNK, 2 * CHUNK)),
-    Layout((CHUNK, 3 * CHUNK, 2 * CHUNK), begins_at_rest=(1,)),
-    Layout((2 * CHUNK, CHUNK), begins_at_rest=(0, 1)),
+    Layout((CHUNK, 3 * CHUNK, 2 * CHUNK), opened=(1,)),
+    Layout((2 * CHUNK, CHUNK), opened=(0, 1)),
 )
 """Dwells of unlike lengths, the longest first, last and in between, and windows that begin at rest."""
 
@@ -50,7 +50,7 @@ def _dense(layout: Layout, steps: NDArray[np.float64], right: NDArray[np.float64
         for place in range(count):
             here, after = first + place, first + (place + 1) % count
             matrix[here, :, after, :] += np.eye(size)
-            if after < here and number in layout.begins_at_rest:
+            if after < here and number in layout.opened:
                 right[:, here] = 0.0
             else:
                 matrix[here, :, here, :] -= steps[:, :, here]

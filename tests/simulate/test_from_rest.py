@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 import savgs_ident as si
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.effect import generic_effects
 from savgs_ident.plants.base import Excitation
@@ -104,7 +103,7 @@ def test_before_the_road_moves_the_rig_rests_whatever_the_link_is_held_at(rig: R
     bump = risen(time, 2.0, 0.01, 0.2) - risen(time, 4.0, 0.01, 0.5)
     orders = 2.0 / count * np.fft.rfft(bump)[:200]
     orders[0] = -orders[1:].sum().real
-    part = ComparedPart(*(np.array([each]) for each in (2.0, 5.0, 1.0, 1.0)))
+    part = ComparedPart(*(np.array([each]) for each in (2.0, 5.0, 1.0, 1.0, 0.0)))
     held = np.array([[float(p["psi_nominal"]) - 0.4]], np.complex128)
     driven = {"road_height": jnp.asarray(orders[None]), "link_angle": jnp.asarray(held)}
     excitation = Excitation(jnp.asarray([1.0 / seconds]), driven, part)
@@ -116,16 +115,14 @@ def test_before_the_road_moves_the_rig_rests_whatever_the_link_is_held_at(rig: R
     assert abs(x[1, 0]) > 0.1 * moved[1]
 
 
-def test_tests_that_do_not_begin_at_rest_are_left_out_with_what_to_do() -> None:
+def test_of_tests_that_do_not_begin_at_rest_the_beginning_is_to_be_estimated() -> None:
     moving = ringing_step("step_late", 6.0, 0.01, begins=0.0)
     found = forgetful_response(steps(ringing_step("step_up", 6.0, 0.01), moving), ringing(), 9)
-    assert found.tests == ("step_up, 0.0 to 6.0 s",)
-    (warning,) = (each for each in found.warnings if each.test == "step_late")
-    assert warning.code == "window_not_used"
-    assert "rest" in warning.remedy
-    with pytest.raises(InputError, match="does not forget") as refused:
-        forgetful_response(steps(moving), ringing(), 9)
-    assert "begin with a second of rest" in refused.value.remedy
+    assert found.tests == ("step_up, 0.0 to 6.0 s", "step_late, 0.0 to 6.0 s")
+    assert found.part is not None
+    assert found.part.begins_at_rest.tolist() == [1.0, 0.0]
+    assert found.part.begins_moving.tolist() == [0.0, 1.0]
+    assert found.part.begin[0] > found.part.begin[1] == 0.0
 
 
 def test_of_a_long_test_the_first_minute_is_compared_and_the_rest_is_said_to_be_left_out() -> None:

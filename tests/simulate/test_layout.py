@@ -53,13 +53,13 @@ def test_slow_dwells_get_nodes_in_proportion_to_their_period(
 
 
 def test_the_loose_ends_are_the_last_nodes_of_what_begins_at_rest() -> None:
-    layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK), begins_at_rest=(0, 2))
+    layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK), opened=(0, 2))
     assert layout.loose_ends.tolist() == [2 * CHUNK - 1, 6 * CHUNK - 1]
     assert Layout(layout.counts).loose_ends.size == 0
     finer = layout.finer(3)
     assert finer.counts == (6 * CHUNK, 3 * CHUNK, 9 * CHUNK)
-    assert finer.begins_at_rest == layout.begins_at_rest
-    assert only_dwells(uniform_mesh(layout), (2, 1)).layout == Layout((3 * CHUNK, CHUNK), begins_at_rest=(0,))
+    assert finer.opened == layout.opened
+    assert only_dwells(uniform_mesh(layout), (2, 1)).layout == Layout((3 * CHUNK, CHUNK), opened=(0,))
 
 
 def test_layouts_of_equal_counts_are_the_same_static_argument() -> None:

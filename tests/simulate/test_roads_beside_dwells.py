@@ -20,7 +20,7 @@ from savgs_ident.simulate.excitation import measured_excitation, response_of_tes
 from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.readings import harmonics
-from tests.simulate.linear_roads import dwells_and_road
+from tests.simulate.linear_roads import campaign, dwells_and_road
 
 MODEL = si.PlantModel(si.TwoMass(), PARAMETERS)
 ORDERS = 9
@@ -110,20 +110,19 @@ def test_a_plant_does_in_both_what_it_does_in_each(
     np.testing.assert_allclose(together[both.windows], windows, atol=1e-8 * np.abs(windows).max())
 
 
-def test_a_plant_that_forgets_too_slowly_is_held_against_the_dwells() -> None:
+def test_of_a_plant_that_forgets_too_slowly_the_road_is_compared_from_its_beginning() -> None:
     ringing = si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": 50.0}))
-    found, motion = forgetful_motion(dwells_and_road(noise=0.0), ringing, ORDERS)
-    assert motion is None
-    assert found.part is None
-    assert len(found.tests) == 5
-    (warning,) = [each for each in found.warnings if each.code == "tests_not_used"]
-    assert "does not forget" in warning.what
+    found, _ = forgetful_motion(dwells_and_road(noise=0.0), ringing, ORDERS)
+    assert found.tests[5:] == ("road_c, 0.0 to 20.0 s",)
+    assert found.part is not None
+    assert found.part.opens.tolist() == [False] * 5 + [True]
 
 
-def test_a_road_that_is_too_short_is_left_out_with_a_warning() -> None:
+def test_a_road_that_is_too_short_for_a_window_is_compared_from_its_beginning() -> None:
     found = forgetful_response(dwells_and_road(seconds=4.0), MODEL, ORDERS)
-    assert len(found.tests) == 5
-    assert any(each.code == "tests_not_used" for each in found.warnings)
+    assert found.tests[5:] == ("road_c, 0.0 to 4.0 s",)
+    assert found.part is not None
+    assert found.part.opens.tolist() == [False] * 5 + [True]
 
 
 def test_a_comparison_shows_dwells_and_windows() -> None:
@@ -175,13 +174,11 @@ def without_reading(campaign: Campaign, kind: str, *names: str) -> Campaign:
 
 
 @pytest.mark.slow
-def test_a_road_too_short_for_what_the_plant_remembers_is_left_out() -> None:
+def test_a_road_too_short_for_what_the_plant_remembers_is_compared_from_its_beginning() -> None:
     """It is long enough for the usual lead, and not for the one that is then asked for."""
     slow = si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": 600.0}))
-    found, motion = forgetful_motion(dwells_and_road(seconds=9.0), slow, ORDERS)
-    assert motion is None
-    assert len(found.tests) == 5
-    assert any(each.code == "tests_not_used" for each in found.warnings)
+    found, _ = forgetful_motion(dwells_and_road(seconds=9.0), slow, ORDERS)
+    assert found.tests[5:] == ("road_c, 0.0 to 9.0 s",)
 
 
 def test_a_road_without_readings_is_left_out() -> None:
@@ -247,3 +244,11 @@ def test_what_was_recorded_beside_is_known_in_windows() -> None:
     ends = [float(test.split(" to ")[1].removesuffix(" s")) for test in found.tests if " to " in test]
     compared = ((found.part.end - found.part.begin) / (2.0 * np.pi * found.frequency))[found.windows]
     np.testing.assert_allclose(oil[found.windows], 20.0 + 0.1 * (ends - 0.5 * compared), atol=0.01)
+
+
+def test_a_channel_that_was_never_recorded_is_not_drawn(tmp_path: Path) -> None:
+    made = without_reading(campaign(), "road", "susp_deflection")
+    compared = compare(MODEL, replace(made, recordings=made.recordings[:1]), ORDERS)
+    files = {each.name for each in compared.save(tmp_path)}
+    assert {"spectra.png", "bode.json"} <= files
+    assert compared.measured.channels == ("road_height", "body_accel")

@@ -1,5 +1,6 @@
 """Tests that do not repeat, cut into windows: a road in simulation, against an independent integration of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -155,7 +156,6 @@ def test_peak_to_peak_values_of_a_road_are_refused() -> None:
 @pytest.mark.parametrize(
     ("made", "what"),
     [
-        (lambda: campaign(seconds=4.0), "s are needed"),
         (lambda: Campaign("made", campaign().recordings[1:], (), ""), "there is no test"),
         (lambda: _standing(campaign()), "does not move"),
         (lambda: _thinned(campaign(), 50), "too slow"),
@@ -275,12 +275,31 @@ def test_windows_begin_as_long_before_what_is_compared_as_the_plant_remembers() 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("c", "says"), [(250.0, r"longest test has 10 s, 2[3-9].* s are needed"), (50.0, "does not forget")]
-)
-def test_a_plant_that_rings_for_longer_than_the_record_is_refused(c: float, says: str) -> None:
-    with pytest.raises(InputError, match=says):
-        forgetful_response(campaign(seconds=10.0, noise=0.0), _damped(c), 9)
+@pytest.mark.parametrize("c", [250.0, 50.0])
+def test_a_road_that_a_plant_never_forgets_is_compared_from_its_beginning(c: float) -> None:
+    found = forgetful_response(campaign(seconds=10.0, noise=0.0), _damped(c), 9)
+    assert found.tests == ("road_c, 0.0 to 10.0 s",)
+    assert found.part is not None
+    assert found.part.opens.all()
+
+
+def test_a_road_that_is_too_short_for_a_window_is_compared_from_its_beginning() -> None:
+    found = estimate_windows(_cut(campaign(), 6.0, 10.0), INPUTS, READINGS)
+    assert found.tests == ("road_c, 0.0 to 4.0 s",)
+    assert found.part is not None
+    assert found.part.begins_moving.tolist() == [1.0]
+    assert found.part.begin.tolist() == [0.0]
+
+
+def _cut(made: Campaign, begin: float, end: float) -> Campaign:
+    """A campaign with its road from one instant to another [s]."""
+    road, *others = made.recordings
+    channels = {
+        name: replace(each, time=each.time[here] - begin, values=each.values[here])
+        for name, each in road.channels.items()
+        if (here := (each.time >= begin) & (each.time < end)).any()
+    }
+    return replace(made, recordings=(replace(road, channels=channels), *others))
 
 
 @pytest.mark.slow
