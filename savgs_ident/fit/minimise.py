@@ -43,6 +43,9 @@ its units of information on every coordinate: a whole standard deviation would h
 which data and prior together hardly hold more."""
 
 
+IN_VAIN = 8
+"""Steps in a row that lead no lower, after which no further one is tried: each is a quarter of the one before it."""
+
 NOTHING = 1e-10
 """A change of chi2 that means nothing, however small chi2 is."""
 
@@ -125,16 +128,18 @@ class Minimiser(eqx.Module):
         """Minimise from ``u``, on the nodes of the solution ``warm_start`` there, parameters pinned as given.
 
         The last step is the one after which the linearisation promises to lower the sum of squares by less
-        than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more. It may
+        than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more, or the
+        last of :data:`IN_VAIN` that did not lower it at all. It may
         lead past points where a motion was not found, but not end at one: the status is that of the motion.
         """
         pins = pins or self.problem.unpinned
         best = trial = evaluate(self.problem, u, pins, warm_start)
         u, state = trial.at.u, eqx.tree_at(lambda each: each.y_eval, placed(self.blank), trial.at.u)
-        status, before = Status.MAX_ITERATIONS, np.inf
+        status, before, in_vain = Status.MAX_ITERATIONS, np.inf, 0
         for count in range(1, steps + 1):
             u, state, done, fine = _step(self.solver, u, trial.at, state)
-            best = trial if bool(jnp.all(u == trial.at.u)) else best
+            taken = bool(jnp.all(u == trial.at.u))
+            best, in_vain = (trial, 0) if taken else (best, in_vain + 1)
             cost = float(jnp.sum(best.at.residual**2))
             if not (fine and best.finite):
                 status = Status.NOT_FINITE if best.status.ok else best.status
@@ -145,6 +150,8 @@ class Minimiser(eqx.Module):
                 status = best.status
                 break
             before = cost
+            if in_vain == IN_VAIN:
+                break
             if count < steps:
                 trial = evaluate_beside(self.problem, state.y_eval, pins, best)
         return _minimum(best, status)

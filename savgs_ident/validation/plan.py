@@ -28,15 +28,16 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model, PlantModel
-from savgs_ident.simulate.excitation import typical_amplitude, typical_levels
+from savgs_ident.simulate.excitation import sine_excitation, typical_amplitude, typical_levels
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.simulate.public import DWELLS, SimulatedResponse, simulate
+from savgs_ident.simulate.public import DWELLS, SimulatedResponse, simulate_response
 from savgs_ident.validation.check_plant import frequencies_about
 from savgs_ident.validation.planned_dwells import (
     PlannedEffect,
     Programme,
     choose,
     effects_shown,
+    errors_with,
     information_of,
     joined,
 )
@@ -45,6 +46,12 @@ Array = NDArray[np.float64]
 
 OFFERED = 16
 """Frequencies that are offered about the natural ones of a plant, where none are given."""
+
+ENDLESS = 1e8
+"""As many times as often a campaign is repeated to see what is left of its errors."""
+
+AS_GOOD_AS = 1.1
+"""Errors, over those that are left then, of which more dwells would take next to nothing [1]."""
 
 ASSUMED_NOISE = 0.01
 """Standard deviation of one sample where none is given, as a share of the largest rms of the channel in a dwell.
@@ -58,14 +65,12 @@ class PlannedTest:
 
     Attributes:
         frequency_hz: of the first input [Hz].
-        amplitude: of the first input [its unit].
-        levels: by how much further inputs are held above rest [their units], by name.
+        programme: how it is driven.
         errors: relative standard errors [1] of the free parameters with it and all before it, in their order.
     """
 
     frequency_hz: float
-    amplitude: float
-    levels: Mapping[str, float]
+    programme: Programme
     errors: tuple[float, ...]
 
 
@@ -78,6 +83,8 @@ class CampaignPlan(Result):
         tests: its dwells, in the order of what they are worth.
         free: the parameters that are to be identified.
         target: the relative standard error [1] that was asked for.
+        least: relative standard errors [1] of the free parameters that tolerances of others leave however much is
+            recorded.
         effects: what it would show of the catalogue, the most visible first.
         visible: standard deviations by which an effect is seen, and told from another [1].
         noise: standard deviation of one sample of each channel [its unit].
@@ -92,6 +99,7 @@ class CampaignPlan(Result):
     tests: tuple[PlannedTest, ...]
     free: tuple[str, ...]
     target: float
+    least: tuple[float, ...]
     effects: tuple[PlannedEffect, ...]
     visible: float
     noise: Mapping[str, float]
@@ -108,6 +116,15 @@ class CampaignPlan(Result):
     def trusted(self) -> bool:
         """Whether every free parameter would be known as well as was asked for."""
         return all(each <= self.target for each in self.errors.values())
+
+    @property
+    def limited(self) -> tuple[str, ...]:
+        """Free parameters of which more dwells would tell no more, for tolerances of others limit them."""
+        return tuple(
+            name
+            for name, least in zip(self.free, self.least, strict=True)
+            if self.errors[name] < AS_GOOD_AS * least
+        )
 
     @property
     def not_visible(self) -> tuple[str, ...]:
@@ -148,7 +165,9 @@ def plan(
         noise: standard deviation of one sample of each channel [its unit], by name; a hundredth of the largest
             motion's rms where it is not given.
         levels: by how much further inputs can be held above rest [their units], by name, one of them at a time; half
-            the typical level and the whole, where they are left out, of inputs whose mean counts.
+            the typical level and the whole, where they are left out, of inputs whose mean counts and that are no
+            motion or force as the first is. Those move along in phase with it and against it, all together and one
+            at a time.
         tests: most dwells of the campaign.
         target: relative standard error that is wanted of the free parameters [1].
         samples: samples of each channel in a dwell.
@@ -162,7 +181,7 @@ def plan(
     """
     use_persistent_cache()
     hertz, sizes = _offers(model, frequencies, amplitudes)
-    programmes = [Programme(size, held) for size in sizes for held in _held(model, levels)]
+    programmes = [each for size in sizes for each in _programmes(model, size, levels)]
     _above_zero({"tests": tests, "target": target, "samples": samples, "orders": orders})
     given, settings, _ = baseline_of(model, orders, (), constants)
     settings = replace(settings, free=given.free(free))
@@ -171,7 +190,10 @@ def plan(
     solved = []
     for each in programmes:
         progress(f"solving {len(hertz)} dwells at {each.said(given)}")
-        solved.append(simulate(given, hertz, orders=orders, amplitude=each.amplitude, levels=each.levels))
+        driven = sine_excitation(
+            given.plant, given.table, np.array(hertz), each.amplitudes(given), each.levels
+        )
+        solved.append(simulate_response(given, driven, orders))
     known, assumed = _noise(given, solved, dict(noise or {}))
     blocks = []
     for each, response in zip(programmes, solved, strict=True):
@@ -192,16 +214,18 @@ def plan(
     ]
     every = joined(blocks)
     chosen, errors = choose(every, len(settings.free), tests, target, constants)
+    total = every.information[chosen].sum(axis=0)
     origin = replace(model.origin(), command=tuple(command))
     return CampaignPlan(
         model=given,
         tests=tuple(
-            PlannedTest(hertz_of, run.amplitude, run.levels, tuple(after.tolist()))
+            PlannedTest(hertz_of, run, tuple(after.tolist()))
             for (hertz_of, run), after in zip((every.dwells[each] for each in chosen), errors, strict=True)
         ),
         free=settings.free,
         target=target,
-        effects=effects_shown(every, every.information[chosen].sum(axis=0), constants),
+        least=tuple(errors_with(every, ENDLESS * total, len(settings.free)).tolist()),
+        effects=effects_shown(every, total, constants),
         visible=constants.visible_sigma,
         noise=known,
         assumed=assumed,
@@ -211,21 +235,30 @@ def plan(
     )
 
 
-def _held(model: Model, levels: Mapping[str, Sequence[float]] | None) -> Iterator[Mapping[str, float]]:
-    """Levels of further inputs to choose among, rest first."""
+def _programmes(
+    model: Model, amplitude: float, levels: Mapping[str, Sequence[float]] | None
+) -> Iterator[Programme]:
+    """Ways to drive dwells with an amplitude of the first input, that in which all others rest first."""
+    first, *others = model.plant.inputs
+    alike = [each.name for each in others if each.unit == first.unit]
     typical = typical_levels(model.build(), model.table)
     if levels is None:
         # A rig is planned as it is run: with its link where it is.
         offered = typical if isinstance(model, PlantModel) else {}
-        levels = {name: [0.5 * level, level] for name, level in offered.items()}
-    yield {}
+        levels = {name: [0.5 * level, level] for name, level in offered.items() if name not in alike}
+    yield Programme(amplitude)
+    for names in dict.fromkeys([tuple(alike), *((name,) for name in alike)]):
+        if names:
+            yield from (
+                Programme(amplitude, beside=dict.fromkeys(names, sign * amplitude)) for sign in (1.0, -1.0)
+            )
     for name, each in levels.items():
         if name not in typical:
             among = ", ".join(typical) or "it has none"
             raise InputError(
                 f"the plant has no further input '{name}' whose level counts", remedy=f"choose among: {among}"
             )
-        yield from ({name: level} for level in each if level)
+        yield from (Programme(amplitude, {name: level}) for level in each if level)
 
 
 def _offers(
@@ -238,6 +271,9 @@ def _offers(
     for size in sizes:
         if not 0.0 < size < np.inf:
             raise InputError(f"an amplitude of {size:g} moves nothing", remedy="give one above zero")
+    for each in frequencies:
+        if not 0.0 < each < np.inf:
+            raise InputError(f"{each:g} Hz is no frequency", remedy="give a frequency above 0 Hz")
     return tuple(sorted(set(frequencies))), tuple(sorted(set(sizes)))
 
 

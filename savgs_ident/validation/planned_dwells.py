@@ -11,6 +11,7 @@ sqrt(S_ee - S_ef^2 / S_ff).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -48,16 +49,32 @@ class PlannedEffect:
 
 
 class Programme(NamedTuple):
-    """How dwells are driven: the amplitude of the first input, and levels of others above rest [their units]."""
+    """How dwells are driven.
+
+    Attributes:
+        amplitude: of the first input [its unit].
+        levels: of others above rest [their units], by name.
+        beside: amplitudes of others that move along [their units], by name; below zero against the first.
+    """
 
     amplitude: float
-    levels: Mapping[str, float]
+    levels: Mapping[str, float] = MappingProxyType({})
+    beside: Mapping[str, float] = MappingProxyType({})
+
+    def amplitudes(self, model: Model) -> dict[str, float]:
+        """Amplitudes of all inputs that move [their units], by name."""
+        return {model.plant.inputs[0].name: self.amplitude, **self.beside}
+
+    def others(self, model: Model) -> tuple[str, ...]:
+        """What inputs beside the first one do, in words."""
+        units = {each.name: each.unit for each in model.plant.inputs}
+        moved = (f"{name} {'in phase' if by > 0.0 else 'against it'}" for name, by in self.beside.items())
+        held = (f"{name} {level:g} {units[name]} above rest" for name, level in self.levels.items())
+        return (*moved, *held)
 
     def said(self, model: Model) -> str:
         """In words."""
-        units = {each.name: each.unit for each in model.plant.inputs}
-        held = (f"{name} {level:g} {units[name]} above rest" for name, level in self.levels.items())
-        return ", ".join((f"{self.amplitude:g} {model.plant.inputs[0].unit}", *held))
+        return ", ".join((f"{self.amplitude:g} {model.plant.inputs[0].unit}", *self.others(model)))
 
 
 class Information(NamedTuple):
@@ -83,9 +100,14 @@ def information_of(
     samples: int,
 ) -> Information:
     """The dwells that are driven in one way."""
-    driven = {given.plant.inputs[0].name: run.amplitude}
     measured = simulate_dwells(
-        given, hertz, driven, noise, samples=samples, orders=settings.orders, levels=run.levels
+        given,
+        hertz,
+        run.amplitudes(given),
+        noise,
+        samples=samples,
+        orders=settings.orders,
+        levels=run.levels,
     )
     problem, data = problem_of_dwells(measured, given, settings)
     origin = np.zeros(len(problem.nuisances))
@@ -131,6 +153,12 @@ def _split(block: Information, total: Array) -> tuple[Array, Array]:
     return np.asarray(known), np.asarray(total[count:, count:] - across.T @ known @ across)
 
 
+def errors_with(block: Information, total: Array, free: int) -> Array:
+    """Relative errors [1] of the ``free`` parameters with so much information."""
+    known, _ = _split(block, total)
+    return np.asarray(np.sqrt(np.diag(known)[:free]) * block.slopes)
+
+
 def choose(
     block: Information, free: int, most: int, target: float, constants: DecisionConstants
 ) -> tuple[list[int], list[Array]]:
@@ -139,20 +167,16 @@ def choose(
     chosen: list[int] = []
     errors: list[Array] = []
 
-    def errors_with(information: Array) -> Array:
-        known, _ = _split(block, information)
-        return np.asarray(np.sqrt(np.diag(known)[:free]) * block.slopes)
-
     def worth(place: int) -> tuple[float, float]:
         with_it = total + block.information[place]
-        beyond = np.maximum(np.log(errors_with(with_it) / target), 0.0)
+        beyond = np.maximum(np.log(errors_with(block, with_it, free) / target), 0.0)
         return -float(np.sum(beyond)), _told_separations(_split(block, with_it)[1], constants.visible_sigma)
 
     while len(chosen) < min(most, len(block.dwells)):
         best = max((each for each in range(len(block.dwells)) if each not in chosen), key=worth)
         total = total + block.information[best]
         chosen.append(best)
-        errors.append(errors_with(total))
+        errors.append(errors_with(block, total, free))
     return chosen, errors
 
 

@@ -147,8 +147,8 @@ def test_a_plan_holds_a_second_input_at_levels_where_that_tells_something() -> N
     noise = {"stroke": 2e-5}
     found = si.plan(model, free=("c_0", "c_1"), tests=4, noise=noise)
     assert found.trusted
-    assert {level for each in found.tests for level in each.levels.values()} <= {1.0, 2.0}
-    assert any(each.levels for each in found.tests)
+    assert {level for each in found.tests for level in each.programme.levels.values()} <= {1.0, 2.0}
+    assert any(each.programme.levels for each in found.tests)
     without = si.plan(model, free=("c_0", "c_1"), tests=4, noise=noise, levels={})
     assert without.errors["c_1"] > 30.0 * found.errors["c_1"], (
         "without a current nothing is known of what it does"

@@ -81,7 +81,7 @@ def _errors(tests: list[tuple[float, float]]) -> dict[str, float]:
 @pytest.mark.slow
 def test_errors_are_those_of_differences(planned: si.CampaignPlan) -> None:
     for count in (1, 4):
-        expected = _errors([(each.frequency_hz, each.amplitude) for each in planned.tests[:count]])
+        expected = _errors([(each.frequency_hz, each.programme.amplitude) for each in planned.tests[:count]])
         for name, error in zip(planned.free, planned.tests[count - 1].errors, strict=True):
             assert error == pytest.approx(expected[name], rel=0.02), (name, count)
 
@@ -89,7 +89,7 @@ def test_errors_are_those_of_differences(planned: si.CampaignPlan) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["suspension_stiffening", "tyre_stiffness", "suspension_oscillator"])
 def test_what_is_seen_of_an_effect_is_what_differences_say(planned: si.CampaignPlan, name: str) -> None:
-    tests = [(each.frequency_hz, each.amplitude) for each in planned.tests]
+    tests = [(each.frequency_hz, each.programme.amplitude) for each in planned.tests]
     model = _model()
     effect = model.catalogue[name]
     (amplitude,) = effect.null
@@ -110,13 +110,13 @@ def test_no_other_first_dwell_comes_closer_to_what_is_asked_for(planned: si.Camp
 
     first = planned.tests[0]
     best = min(beyond((f, a)) for f in FREQUENCIES for a in (0.005, 0.01))
-    assert beyond((first.frequency_hz, first.amplitude)) == pytest.approx(best, abs=0.02)
+    assert beyond((first.frequency_hz, first.programme.amplitude)) == pytest.approx(best, abs=0.02)
 
 
 @pytest.mark.slow
 def test_the_campaign_identifies_what_it_was_planned_for(planned: si.CampaignPlan) -> None:
     assert planned.trusted
-    large = [each.frequency_hz for each in planned.tests if each.amplitude == 0.01]
+    large = [each.frequency_hz for each in planned.tests if each.programme.amplitude == 0.01]
     recorded = si.simulate_dwells(
         _model().with_values({"k": 6.1e4, "c": 2.05e3}),
         large,
