@@ -269,7 +269,7 @@ def compare(
     if isinstance(measured, DrivenMotion):
         progress("finding the force that the model needs")
         return compare_along_motion(model, measured, origin_along(model, measured))
-    response = compared_response(measured, model.before, orders, None, progress)
+    response = compared_response(measured, model.before, orders, None, progress, identified=model)
     excitation = measured_excitation(model.plant, response, model.table)
     names = [each.name for each in model.channels]
     places = [response.channel(name) for name in names if name in response.channels]

@@ -167,7 +167,7 @@ def _measured(
 ) -> HarmonicResponse:
     if measured is not None:
         model = identified.model if isinstance(identified, Fit) else identified
-        return compared_response(measured, model.before, orders, max_frequency, progress)
+        return compared_response(measured, model.before, orders, max_frequency, progress, identified=model)
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")

@@ -80,9 +80,13 @@ def compared_response(
     orders: int,
     max_frequency: float | None = None,
     progress: Progress = no_progress,
+    identified: Model | None = None,
 ) -> HarmonicResponse:
-    """The response alone."""
-    return compared_motion(measured, model, orders, max_frequency, progress)[0]
+    """The response alone, with the beginnings that go with an ``identified`` model where it is given."""
+    response, _ = forgetful_motion(measured, model, orders, max_frequency, progress)
+    if response.part is None or not response.part.begins_moving.any():
+        return response
+    return estimate_beginnings(response, identified or model, orders, progress)
 
 
 def estimate_beginnings(
