@@ -38,7 +38,7 @@ from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes
 from savgs_ident.inference.background.locations import Linearisation, input_locations
 from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.inference.background.shared_errors import background_about, without_drifts
-from savgs_ident.inference.beginnings import Begun
+from savgs_ident.inference.initial_states import FreeInitialStates
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.likely_mistake import likely_mistake
@@ -76,7 +76,7 @@ class DwellProblem(AbstractProblem):
         recorded: when each test was recorded, in any unit of time; the tests are in that order where empty.
         beyond: what drifts do to all rows beyond first order [unit of each], (m,); None where nothing drifts.
         beside: what else was recorded in each test [its unit], (D,) by name; NaN where it was not.
-        begun: the states with which tests begin that do not begin at rest; None where all do.
+        initial_states: the states with which tests begin that do not begin at rest; None where all do.
     """
 
     excitation: Excitation = field(kw_only=True)
@@ -87,7 +87,7 @@ class DwellProblem(AbstractProblem):
     recorded: tuple[float, ...] = field(default=(), kw_only=True)
     beyond: NDArray[np.float64] | None = field(default=None, kw_only=True)
     beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
-    begun: Begun | None = field(default=None, kw_only=True)
+    initial_states: FreeInitialStates | None = field(default=None, kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
@@ -103,6 +103,13 @@ class DwellProblem(AbstractProblem):
     def orders(self) -> int:
         """Highest order of the harmonics."""
         return self.shape[2] - 1
+
+    def seeing(self, rows: NDArray[np.float64]) -> "DwellProblem":
+        """The same where other rows (m,) were measured [unit of each]: its tests begin as these say."""
+        if self.initial_states is None:
+            return self
+        measured = self.likelihood.harmonics(rows[None], self.shape)[0]
+        return replace(self, initial_states=self.initial_states.seeing(measured))
 
     @property
     def channel(self) -> NDArray[np.intp]:
@@ -168,8 +175,12 @@ class DwellProblem(AbstractProblem):
         model, p = self._model_with(terms, values)
         self._have_compiled(model, p)
         found = resolve_with_states(model, p, known, partial(self._signals_along, p=p))
-        if self.begun is not None and found.excitation.moving.size and joint_status(found.status()).ok:
-            found = self.begun.best(model, p, found)
+        if (
+            self.initial_states is not None
+            and found.excitation.moving.size
+            and joint_status(found.status()).ok
+        ):
+            found = self.initial_states.best(model, p, found)
         return model, p, found
 
     def corrected(
@@ -401,6 +412,8 @@ def dwell_problem(
         constants=constants,
         recorded=tuple(measured.times.tolist()),
         beside=measured.beside,
-        begun=None if measured.beginnings is None else Begun.of_response(measured, plant, orders),
+        initial_states=None
+        if measured.initial_states is None
+        else FreeInitialStates.of_response(measured, plant, orders),
     )
     return problem, likelihood.data

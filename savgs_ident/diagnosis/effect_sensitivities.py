@@ -46,7 +46,7 @@ PERIODS = 16
 """Periods of a dwell after which they repeat: what rang at the start has died away even in a slow frame."""
 
 PERIODS_OF_A_WINDOW = 2
-"""The same of a window, which is long, and compared after a lead."""
+"""The same of a window, which is long, and compared after a lead; one that begins with a given state has none."""
 
 
 class AlikeTests(NamedTuple):
@@ -69,9 +69,10 @@ def alike_tests(
     tests = range(len(layout.counts)) if wanted is None else wanted
     dwells = tuple(test for test in tests if test not in windows)
     found = [AlikeTests(dwells, SAMPLES, PERIODS)] if dwells else []
-    every = tuple(test for test in tests if test in windows)
-    if every:
-        found.append(AlikeTests(every, layout.counts[every[0]], PERIODS_OF_A_WINDOW))
+    for opened, periods in ((False, PERIODS_OF_A_WINDOW), (True, 1)):
+        alike = tuple(test for test in tests if test in windows and (test in layout.opened) is opened)
+        if alike:
+            found.append(AlikeTests(alike, layout.counts[alike[0]], periods))
     return found
 
 

@@ -161,6 +161,10 @@ def predict_left_out(
         predicted = predicted + weights @ missed
         steep = steep - weights @ part.turned(slopes)
         variance = variance - np.sum(weights * known, axis=1)
+    # How the tests that are left out begin they alone know.
+    own, miss = data.part(out), data.measured[out] - predicted
+    miss = miss - own.explained_by_nuisances(miss)
+    steep = steep - own.explained_by_nuisances(steep)
+    predicted = data.measured[out] - miss
     variance = variance + np.einsum("ij,jk,ik->i", steep, covariance, steep)
-    miss = data.measured[out] - predicted
     return predicted, -0.5 * (miss**2 / variance + np.log(variance / data.variance[out]))

@@ -28,7 +28,7 @@ from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, 
 from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.beginnings import compared_response, settle_beginnings
+from savgs_ident.inference.initial_states import compared_response, settle_initial_states
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.inference.problem import ProblemSettings
@@ -206,9 +206,9 @@ def ask(
     response = compared_response(measured, model, orders, max_frequency, progress)
     model, resized = sized_to(model, response)
     given, settings, values = baseline_of(model, orders, without, constants)
-    if response.beginnings is not None:
+    if response.initial_states is not None:
         options = ProblemSettings(orders=orders)
-        response, _ = settle_beginnings(response, given, tuple(settings.free), options, progress)
+        response, _ = settle_initial_states(response, given, tuple(settings.free), options, progress)
     return AskedDwells(response, given, settings, values, (*response.warnings, *resized))
 
 

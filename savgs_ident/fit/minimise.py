@@ -151,6 +151,7 @@ class Minimiser(eqx.Module):
                 break
             before = cost
             if in_vain == IN_VAIN:
+                status = Status.STALLED
                 break
             if count < steps:
                 trial = evaluate_beside(self.problem, state.y_eval, pins, best)

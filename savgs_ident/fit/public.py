@@ -18,7 +18,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.along_motion import MotionComparison, MotionFit, compare_along_motion, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
-from savgs_ident.inference.beginnings import compared_motion, compared_response, settle_beginnings
+from savgs_ident.inference.initial_states import compared_motion, compared_response, settle_initial_states
 from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
@@ -148,8 +148,8 @@ def fit_with(
     # as long, and on cores that are free they gain a tenth of a second.
     with threadpool_limits(1, "blas"):
         begin = None
-        if response.beginnings is not None:
-            response, begin = settle_beginnings(response, drawing, names, settings.problem, progress)
+        if response.initial_states is not None:
+            response, begin = settle_initial_states(response, drawing, names, settings.problem, progress)
         return fit_least_squares(
             response,
             drawing,

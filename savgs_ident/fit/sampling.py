@@ -25,8 +25,8 @@ from savgs_ident.fit.identifiability import (
 from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
 from savgs_ident.inference.background.constants import BACKGROUND
-from savgs_ident.inference.beginnings import compared_response
 from savgs_ident.inference.harmonic_question import PosedHarmonics, Question
+from savgs_ident.inference.initial_states import compared_response
 from savgs_ident.inference.motion_question import MotionQuestion, PosedMotion
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task

@@ -36,7 +36,8 @@ def predict(exact: ExactHarmonics, chains: Chains, count: int, seed: int) -> Pre
     likelihood, shape = exact.likelihood, model.shape[1:]
     spread = np.asarray(jax.vmap(likelihood.spread)(jnp.asarray(points)))
     errors = np.random.default_rng(seed).standard_normal(spread.shape) * np.sqrt(spread)
-    replicated = model + likelihood.harmonics(errors, shape)
+    rows = np.stack([likelihood.rows_of_one(each) for each in model])
+    replicated = likelihood.harmonics(rows + errors, shape)
     measured = likelihood.harmonics(np.asarray(likelihood.measured)[None], shape)[0]
     used = np.asarray(exact.problem.target.used)
     return Predictive(model, np.where(used, replicated, 0.0), used, _inside(measured, replicated, used))

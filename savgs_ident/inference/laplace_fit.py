@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status
 from savgs_ident.inference.laplace import covariance_over_discrepancies
 from savgs_ident.inference.likelihood import NoiseScales
-from savgs_ident.inference.observations import SILENT, Data, Plant, Prediction
+from savgs_ident.inference.observations import Data, Plant, Prediction
 from savgs_ident.inference.prior import Coordinates, values_at
 
 Array = NDArray[np.float64]
@@ -121,22 +121,18 @@ class Search:
     def tolerated_errors(self, fit: LaplaceFit) -> Array:
         """The most probable errors within tolerances beside a fit, in their widths [1], (t,)."""
         tolerated = self.data.tolerated
-        return np.zeros(0) if tolerated is None else self._shared_errors(fit, tolerated)
-
-    def _shared_errors(self, fit: LaplaceFit, columns: Array) -> Array:
-        """The most probable sizes [1], (t,), of errors that go with the noise, (m, t)."""
+        if tolerated is None:
+            return np.zeros(0)
         scales = fit.noise_scales
         missed = self.missed(fit.prediction) / scales.spread
-        return np.asarray(scales.noise**2 * self.turned(columns).T @ missed)
+        return np.asarray(scales.noise**2 * self.turned(tolerated).T @ missed)
 
     def followed(self, fit: LaplaceFit) -> Array:
-        """The rows of a fit [their units], (m,), with its most probable errors within tolerances."""
+        """The rows of a fit [their units], (m,), with its most probable errors within tolerances, and nuisances."""
         rows = fit.prediction.rows
         if self.data.tolerated is not None:
             rows = rows + self.data.tolerated @ self.tolerated_errors(fit)
-        if self.data.silent is not None:
-            rows = rows + SILENT * self.data.silent @ self._shared_errors(fit, SILENT * self.data.silent)
-        return np.asarray(rows)
+        return np.asarray(rows + self.data.explained_by_nuisances(self.data.measured - rows))
 
 
 def search_of(plant: Plant, data: Data, given: Start | None = None) -> Search:

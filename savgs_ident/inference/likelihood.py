@@ -76,14 +76,15 @@ class Likelihood(RowLikelihood):
 
     ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
     the rows that are compared; both are without dimension. Where rows share errors, ``turning`` (m, m) makes rows
-    without unit of them that do not. ``silent`` are directions of the rows that are not turned in which they say
-    nothing, each as large as their noise [units of the rows].
+    without unit of them that do not. ``nuisance`` are directions of the rows that are not turned in which they say
+    nothing [units of the rows]; then ``back`` leads from turned rows to those that are not, and what is beside them.
     """
 
     axes: Float[Array, "D C K 2 2"]
     place: np.ndarray
-    turning: Float[Array, "m m"] | None = None
-    silent: Float[Array, "m t"] | None = None
+    turning: Float[Array, "r m"] | None = None
+    back: tuple[Float[Array, "m r"], Float[Array, " m"]] | None = None
+    nuisance: Float[Array, "m t"] | None = None
 
     def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Predicted harmonics as rows [units of the channels, or 1 where they are turned], (m,)."""
@@ -116,16 +117,23 @@ class Likelihood(RowLikelihood):
         if self.turning is not None:
             return super().data
         found = self._data(self.test)
-        return found if self.silent is None else replace(found, silent=np.asarray(self.silent))
+        return found if self.nuisance is None else replace(found, nuisance=np.asarray(self.nuisance))
 
     def harmonics(
         self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
     ) -> Complex[np.ndarray, "S D C K"]:
         """Rows [unit of the reading] as complex harmonics ``(S, *shape)``; zero where nothing is compared."""
         parts = np.zeros((rows.shape[0], 2 * int(np.prod(shape))))
-        parts[:, self.place] = rows if self.turning is None else np.linalg.solve(self.turning, rows.T).T
+        parts[:, self.place] = rows if self.turning is None else self._turned_back(rows)
         turned = np.einsum("dckij,sdcki->sdckj", np.asarray(self.axes), parts.reshape(-1, *shape, 2))
         return np.asarray(turned[..., 0] + 1j * turned[..., 1])
+
+    def _turned_back(self, rows: Float[np.ndarray, "S r"]) -> Float[np.ndarray, "S m"]:
+        """Rows before they were turned; along nuisances they are as near the measured ones as these make them."""
+        if self.back is None:
+            return np.asarray(np.linalg.solve(np.asarray(self.turning), rows.T).T)
+        matrix, rest = (np.asarray(each) for each in self.back)
+        return np.asarray(rows @ matrix.T + rest)
 
 
 def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likelihood:
@@ -150,26 +158,32 @@ def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likel
         variance=jnp.asarray(variance),
         discrepancy_scale=jnp.asarray(discrepancy_scale),
         scales=scales or Scales(),
-        silent=None
-        if target.silent is None
-        else _silent_rows(np.asarray(target.silent), whitening, axes, place),
+        nuisance=None
+        if target.nuisance is None
+        else _nuisance_rows(np.asarray(target.nuisance), whitening, axes, place),
     )
 
 
-def _silent_rows(
-    silent: np.ndarray, whitening: np.ndarray, axes: np.ndarray, place: np.ndarray
+def _nuisance_rows(
+    nuisance: np.ndarray, whitening: np.ndarray, axes: np.ndarray, place: np.ndarray
 ) -> Float[Array, "m t"]:
     """Directions of the residuals of a target (all, t) as directions of the rows."""
     unused = np.all(whitening == 0.0, axis=(-2, -1), keepdims=True)
     spread = np.linalg.inv(whitening + unused * np.eye(2))
-    parts = silent.reshape(*whitening.shape[:-1], -1)
+    parts = nuisance.reshape(*whitening.shape[:-1], -1)
     rows = np.einsum("dckij,dckjl,dcklt->dckit", axes, spread, parts)
-    return jnp.asarray(rows.reshape(-1, silent.shape[1])[place])
+    return jnp.asarray(rows.reshape(-1, nuisance.shape[1])[place])
 
 
 def sharing_errors(likelihood: Likelihood, data: Data) -> Likelihood:
     """The likelihood of the same harmonics where their rows share the errors that ``data`` says, of the same rows."""
     alone = data.independent
+    turning, back = data.turned(np.eye(data.measured.size)), None
+    if data.nuisance is not None:
+        # Numbers count by their noise, or those in small units would be what others make of them.
+        sd = np.sqrt(data.variance)
+        matrix = sd[:, None] * np.linalg.pinv(turning * sd)
+        back = jnp.asarray(matrix), jnp.asarray(data.measured - matrix @ alone.measured)
     return Likelihood(
         axes=likelihood.axes,
         place=likelihood.place,
@@ -177,7 +191,8 @@ def sharing_errors(likelihood: Likelihood, data: Data) -> Likelihood:
         variance=jnp.asarray(alone.variance),
         discrepancy_scale=jnp.asarray(alone.discrepancy_scale),
         scales=data.scales,
-        turning=jnp.asarray(data.turned(np.eye(alone.measured.size))),
+        turning=jnp.asarray(turning),
+        back=back,
     )
 
 

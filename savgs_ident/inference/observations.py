@@ -16,9 +16,14 @@ MULTIPLES = (0.4, 1.0, 2.5)
 """Shapes are tried at these multiples of their typical values, unless a term says otherwise."""
 
 
-SILENT = 1e5
-"""Errors in their noise with which rows say nothing in a direction: far more than any misfit, and no more than a
-factorisation resolves."""
+DEPENDENT = 1e-9
+"""Size of a direction, over the largest, below which others make it up [1]."""
+
+
+def spanned(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns of length one, perpendicular to each other, that span the same as columns (m, n) of any units."""
+    along, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return along[:, sizes > DEPENDENT * sizes.max(initial=0.0)]
 
 
 @dataclass(frozen=True)
@@ -143,8 +148,8 @@ class Data:
         shared: B, by how much it moves them together, (m, k); None where they share nothing.
         tolerated: errors of known size that they share, (m, t): what is known of the model to a tolerance, but is no
             number of its own. Their scale is that of the noise. None where there are none.
-        silent: directions in which they say nothing, each as large as their noise, (m, s): what other beginnings of
-            tests would change. None where there are none.
+        nuisance: directions in which they say nothing, (m, s): what other initial states of tests would change. None
+            where there are none. There are so many independent numbers less.
     """
 
     measured: NDArray[np.float64]
@@ -154,7 +159,7 @@ class Data:
     scales: Scales = field(default_factory=Scales)
     shared: NDArray[np.float64] | None = None
     tolerated: NDArray[np.float64] | None = None
-    silent: NDArray[np.float64] | None = None
+    nuisance: NDArray[np.float64] | None = None
 
     def part(self, mask: NDArray[np.bool_]) -> "Data":
         """The numbers that ``mask`` (m,) picks: the same object each time, for its axes take long to find."""
@@ -178,7 +183,7 @@ class Data:
             self.scales,
             None if self.shared is None else self.shared[mask],
             None if self.tolerated is None else self.tolerated[mask],
-            None if self.silent is None else self.silent[mask],
+            None if self.nuisance is None else self.nuisance[mask],
         )
 
     @cached_property
@@ -225,19 +230,32 @@ class Data:
                 drawn += size * columns @ random.standard_normal(columns.shape[1])
         return drawn
 
+    def explained_by_nuisances(self, missed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of numbers, (m,) or (m, n), that goes along the nuisances: by their noise the nearest such."""
+        if self.nuisance is None:
+            return np.zeros_like(missed)
+        weight = 1.0 / np.sqrt(self.variance)
+        whitened = self.nuisance * weight[:, None]
+        sizes = np.linalg.lstsq(whitened, (missed.T * weight).T)[0]
+        return np.asarray(self.nuisance @ sizes)
+
     @property
     def _share(self) -> bool:
-        return any(each is not None for each in (self.shared, self.tolerated, self.silent))
+        return any(each is not None for each in (self.shared, self.tolerated, self.nuisance))
 
     @cached_property
     def _axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Discrepancy scales (m,) along the principal axes, in noise sd, and what turns the numbers there, (m, m)."""
+        """Discrepancy scales (m,) along the principal axes, in noise sd, and what turns the numbers there, (m, m).
+
+        Both have fewer rows where numbers say nothing in some directions.
+        """
         noise, alone = np.diag(self.variance), np.diag(self.discrepancy_scale)
         if self.tolerated is not None:
             noise += self.tolerated @ self.tolerated.T
-        if self.silent is not None:
-            noise += (SILENT * self.silent) @ (SILENT * self.silent).T
         whiten = solve_triangular(np.linalg.cholesky(noise), np.eye(noise.shape[0]), lower=True)
+        if self.nuisance is not None:
+            basis = spanned(whiten @ self.nuisance)
+            whiten = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :].T @ whiten
         errors = whiten @ (alone if self.shared is None else np.concatenate([alone, self.shared], axis=1))
         squares, axes = np.linalg.eigh(errors @ errors.T)
         return np.sqrt(np.maximum(squares, 0.0)), axes.T @ whiten

@@ -24,6 +24,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
+from savgs_ident.inference.observations import spanned
 from savgs_ident.plants.base import AbstractPlant, Channel, Excitation, Motion
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
@@ -40,8 +41,8 @@ class HarmonicTarget(eqx.Module):
     ``whitening`` (D, C, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not
     ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it. ``decay`` (C,) is the power
     of the order with which a discrepancy of the model falls in each channel of dwells; in ``windows``, by their
-    places, it is a share of what is near it. ``silent`` (m, t) are directions of the residuals, perpendicular and of
-    length one, in which these say nothing: what other beginnings of tests would change.
+    places, it is a share of what is near it. ``nuisance`` (m, t) are directions of the residuals, perpendicular and
+    of length one, in which these say nothing: what other initial states of tests would change.
     """
 
     measured: Complex[Array, "D C K"]
@@ -49,14 +50,14 @@ class HarmonicTarget(eqx.Module):
     used: np.ndarray = eqx.field(static=False)
     decay: tuple[int, ...] = eqx.field(static=True)
     windows: tuple[int, ...] = eqx.field(static=True)
-    silent: Float[Array, "m t"] | None = None
+    nuisance: Float[Array, "m t"] | None = None
 
     def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Residuals in standard deviations, (D * C * (n + 1) * 2,)."""
         miss = predicted - self.measured
         parts = jnp.stack([miss.real, miss.imag], axis=-1)
         found = jnp.einsum("dckij,dckj->dcki", self.whitening, parts).ravel()
-        return found if self.silent is None else found - self.silent @ (self.silent.T @ found)
+        return found if self.nuisance is None else found - self.nuisance @ (self.nuisance.T @ found)
 
     @property
     def size(self) -> int:
@@ -65,8 +66,8 @@ class HarmonicTarget(eqx.Module):
 
     @property
     def entries(self) -> int:
-        """Real numbers compared, less those that other beginnings of the tests could make anything."""
-        return 2 * int(self.used.sum()) - (0 if self.silent is None else self.silent.shape[1])
+        """Real numbers compared, less those that other initial states could make anything."""
+        return 2 * int(self.used.sum()) - (0 if self.nuisance is None else self.nuisance.shape[1])
 
 
 class PeakToPeakTarget(eqx.Module):
@@ -140,21 +141,16 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
         tuple(each.decay for each in channels),
         tuple(measured.windows.tolist()),
         None
-        if measured.beginnings is None
-        else _silent(np.asarray(whitening, np.float64), measured.beginnings.changes[:, :, :count]),
+        if measured.initial_states is None
+        else _nuisance(np.asarray(whitening, np.float64), measured.initial_states.changes[:, :, :count]),
     )
 
 
-DEPENDENT = 1e-9
-"""Size of a direction, over the largest of its test, below which other directions make it up [1]."""
-
-
-def _silent(whitening: NDArray[np.float64], changes: NDArray[np.complex128]) -> Float[Array, "m t"]:
+def _nuisance(whitening: NDArray[np.float64], changes: NDArray[np.complex128]) -> Float[Array, "m t"]:
     """Directions of the residuals, perpendicular and of length one, that span ``changes`` (D, C, K, m)."""
     found = []
     for place, each in enumerate(whitened(whitening, changes)):
-        axes, sizes, _ = np.linalg.svd(each, full_matrices=False)
-        kept = axes[:, sizes > DEPENDENT * sizes.max(initial=0.0)]
+        kept = spanned(each)
         columns = np.zeros((len(changes), *kept.shape))
         columns[place] = kept
         found.append(columns.reshape(-1, kept.shape[1]))

@@ -165,6 +165,8 @@ class Posterior(Result, ABC):
 
     errs_in: ClassVar[str]
     """Of what its discrepancy is a share, in words."""
+    noise_is_recorded: ClassVar[bool]
+    """Whether recordings show its noise; otherwise that is estimated along."""
 
     model: Model
     sampler: Sampler
@@ -201,12 +203,21 @@ class Posterior(Result, ABC):
 
     @property
     def explained(self) -> bool:
-        """Whether the model may have no more than small errors of any model, to 97.5 %."""
-        return not self["discrepancy"].q025 > BACKGROUND.largest_error
+        """Whether the model may have no more than small errors of any model, to 97.5 %, and the noise be recorded."""
+        return not (self["discrepancy"].q025 > BACKGROUND.largest_error or self._is_noisy)
 
     @property
-    def condition(self) -> str:
+    def _is_noisy(self) -> bool:
+        """Whether the noise would have to be far more than the recordings show of it, where they show it."""
+        return self.noise_is_recorded and self["noise_scale"].q025 > BACKGROUND.noisiest
+
+    @property
+    def _condition(self) -> str:
         """What would have to be so for the model to explain the data, in words."""
+        if self._is_noisy:
+            return (
+                f"the noise would have to be {self['noise_scale'].median:.2g} times what the recordings show"
+            )
         return f"it would have to err by {100.0 * self['discrepancy'].median:.2g} % {self.errs_in}"
 
     @property
@@ -215,7 +226,7 @@ class Posterior(Result, ABC):
         if self.explained:
             return self.convergence.reasons
         what = (
-            f"{UNEXPLAINED}: for that {self.condition}; "
+            f"{UNEXPLAINED}: for that {self._condition}; "
             "look for what is missing with `diagnose`, until then the parameters make up for it by more than their "
             "intervals say"
         )
@@ -252,25 +263,10 @@ class HarmonicPosterior(Posterior):
 
     presenter: ClassVar[str] = "POSTERIOR"
     errs_in: ClassVar[str] = "of the response at each of its ports"
+    noise_is_recorded: ClassVar[bool] = True
 
     predictive: Predictive
     measured: HarmonicResponse
-
-    @property
-    def explained(self) -> bool:
-        """Whether it may have no more than small errors, and the noise be what the recordings show of it."""
-        return super().explained and not self._is_noisy
-
-    @property
-    def condition(self) -> str:
-        """What would have to be so for the model to explain the data, in words."""
-        if not self._is_noisy:
-            return super().condition
-        return f"the noise would have to be {self['noise_scale'].median:.2g} times what the recordings show"
-
-    @property
-    def _is_noisy(self) -> bool:
-        return self["noise_scale"].q025 > BACKGROUND.noisiest
 
     @property
     def count_inside(self) -> tuple[int, int]:
@@ -310,6 +306,7 @@ class MotionPosterior(Posterior):
 
     presenter: ClassVar[str] = "MOTION_POSTERIOR"
     errs_in: ClassVar[str] = "of the force, in every row by itself"
+    noise_is_recorded: ClassVar[bool] = False
 
     predictive: PredictedForce
     motion: DrivenMotion

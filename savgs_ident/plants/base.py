@@ -338,14 +338,14 @@ class Excitation(NamedTuple):
         frequency: fundamental [Hz], (D,).
         harmonics: of each input by its name [its unit], (D, K + 1), with as many orders as each needs.
         part: of each period that is compared of what sensors read; None where all of it is, at all orders.
-        beginnings: states of the plant with which tests begin that do not begin at rest [SI], (D, m); None where none
-            does, or where these begin at rest as long as nothing better is known.
+        initial_states: states of the plant in tests that do not begin at rest [SI], (D, m); None where none does, or
+            where these begin at rest as long as nothing better is known.
     """
 
     frequency: Float[Array, " D"]
     harmonics: Mapping[str, Complex[Array, "D K"]]
     part: ComparedPart | None = None
-    beginnings: Float[Array, "D m"] | None = None
+    initial_states: Float[Array, "D m"] | None = None
 
     @property
     def spacing(self) -> Float[Array, " D"]:

@@ -82,9 +82,10 @@ def check_inputs(
     names: Sequence[str], recordings: Sequence[Recording], source: str
 ) -> tuple[DataWarning, ...]:
     """Warnings ``input_not_recorded`` of inputs that some tests have and others lack."""
-    tests = [each for each in recordings if each.kind not in ("standstill", "decay")]
-    found = []
+    moving, found = [each for each in recordings if each.kind != "standstill"], []
     for name in names:
+        # Nothing drives a plant in a decay.
+        tests = [each for each in moving if each.kind != "decay" or name != names[0]]
         lack = [each.name for each in tests if name not in each.channels]
         if 0 < len(lack) < len(tests):
             also = f"and in {len(lack) - 1} more " if len(lack) > 1 else "alone "

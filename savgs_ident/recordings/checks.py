@@ -283,6 +283,7 @@ def _unknown(recording: Recording, place: DataLocation) -> tuple[DataWarning, ..
         place.warning(
             "test_kind_unknown",
             "what kind of test this is does not follow from its name; without dwells it is taken for a road",
-            "call it dwell_<f>Hz, sweep..., road..., step... or standstill, by events, a test column or the file",
+            "call it dwell_<f>Hz, sweep..., road..., step..., decay... or standstill, by events, a test column or "
+            "the file",
         ),
     )

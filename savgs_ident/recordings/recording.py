@@ -336,7 +336,7 @@ _ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band|multi[ _-]?si
 _STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
 _PULSE = re.compile(r"square|pulse|bump", re.IGNORECASE)
 _STEP = re.compile(r"step", re.IGNORECASE)
-_DECAY = re.compile(r"decay|ring_?down|pluck|release|free_?vibration", re.IGNORECASE)
+_DECAY = re.compile(r"decay|ring[ _-]?down|pluck|release|free[ _-]?vib", re.IGNORECASE)
 _DWELL = re.compile(r"dwell|harmonic|(?<!multi)(?<!multi[ _-])(sine|sinus)", re.IGNORECASE)
 
 

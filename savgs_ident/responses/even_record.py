@@ -1,6 +1,6 @@
 """The channels of a test at even instants, all at the same, as a window of it is cut."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 
@@ -28,9 +28,15 @@ LEAST_SAMPLES = 2.5
 DECAY_LEAST = 0.25
 """A decay may be that much shorter than other tests [1]: it is compared from its first sample on."""
 
+SOON = 0.1
+"""A release before this share of the time that a plant has to rest is the beginning of the test [1]."""
+
 _RATE_HZ = 1000.0
 _FEWEST = 10
 _NOISY = 8.0
+_MOVES = 3.0
+_SAME = 1e-9
+_FEW = 4
 
 
 @dataclass(frozen=True)
@@ -117,78 +123,137 @@ def even_record(
     """
     driven = inputs[0]
 
-    def refuse(what: str, remedy: str) -> DataWarning:
-        return DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
+    def refuse(what: str, remedy: str, channel: str = driven) -> DataWarning:
+        return DataWarning("window_not_used", what, source, recording.name, channel, None, remedy)
 
-    usable = {}
-    for name in names:
-        channel = recording.channels.get(name)
-        known = None if channel is None else np.isfinite(channel.values)
-        if channel is not None and known is not None and np.count_nonzero(known) >= _FEWEST:
-            time, first = np.unique(channel.time[known], return_index=True)
-            usable[name] = time, channel.values[known][first]
-    decays = recording.kind == "decay" and bool(usable)
-    if driven not in usable and not decays:
+    usable = {name: each for name in names if (each := _usable(recording, name)) is not None}
+    rest = REST_S * time_scale
+    if is_decay(recording, inputs):
+        readings = {name: each for name, each in usable.items() if name not in inputs}
+        if not readings:
+            return refuse("no reading was recorded", "map a channel of the plant, or leave this test out")
+        found = _evenly(readings, recording.name, still, rest, _RATE_HZ / time_scale)
+        if found is None or found.slowest < LEAST_SAMPLES * highest_hz:
+            return refuse(*_unfit(readings, highest_hz))
+        released = _released(found, {name: usable[name] for name in inputs if name in usable})
+        if released.duration < DECAY_LEAST * least_s:
+            what = f"{released.duration:.2g} s of it are left once nothing holds the plant"
+            return refuse(what, "record for longer after the release", next(iter(readings)))
+        return released
+    if driven not in usable:
         return refuse(f"{driven} was not recorded", "map its channel, or leave this test out")
-    if not decays and np.ptp(usable[driven][1]) == 0.0:
+    if np.ptp(usable[driven][1]) == 0.0:
         return refuse(
             f"{driven} does not move",
             "name this test a standstill, or a decay if it shows how the plant comes to rest",
         )
+    found = _evenly(usable, recording.name, still, rest, _RATE_HZ / time_scale)
+    if found is None or found.duration < least_s or found.slowest < LEAST_SAMPLES * highest_hz:
+        return refuse(*_unfit(usable, highest_hz))
+    return found
+
+
+_Samples = tuple[Array, Array]
+"""Instants [s] and values of a channel."""
+
+
+def is_decay(recording: Recording, inputs: Sequence[str]) -> bool:
+    """Whether nothing drives the plant in a test that is called a decay: a recorded input shows noise at its end."""
+    return recording.kind == "decay" and not any(
+        np.std(later) > max(_MOVES * roughness(later), _SAME * np.max(np.abs(later)))
+        for name in inputs
+        if (each := _usable(recording, name)) is not None and (later := each[1][each[1].size // 2 :]).size
+    )
+
+
+def _usable(recording: Recording, name: str) -> _Samples | None:
+    """The samples of a channel that are numbers, each instant once; None where there are next to none."""
+    channel = recording.channels.get(name)
+    if channel is None or np.count_nonzero(known := np.isfinite(channel.values)) < _FEWEST:
+        return None
+    time, first = np.unique(channel.time[known], return_index=True)
+    return time, channel.values[known][first]
+
+
+def _unfit(usable: Mapping[str, _Samples], highest_hz: float) -> tuple[str, str, str]:
+    """Why channels cannot be compared up to a frequency [Hz], what to do, and which one is to blame."""
+    lasting = min(time[-1] for time, _ in usable.values()) - max(time[0] for time, _ in usable.values())
+    last = min(usable, key=lambda name: _rate(usable[name]))
+    if _rate(usable[last]) >= LEAST_SAMPLES * highest_hz:
+        what = f"its channels overlap for {max(lasting, 0.0):.2g} s"
+        return what, "look at the clocks of the channels", next(iter(usable))
+    what = f"{last} is sampled at {_rate(usable[last]):.3g} Hz, too slow for what is compared up to {highest_hz:g} Hz"
+    return what, f"sample every channel at {4.0 * highest_hz:g} Hz or faster", last
+
+
+def _rate(samples: _Samples) -> float:
+    """Samples a second [Hz]."""
+    time, _ = samples
+    return float((time.size - 1) / (time[-1] - time[0]))
+
+
+def _evenly(
+    usable: Mapping[str, _Samples], test: str, still: dict[str, float], rest: float, most_hz: float
+) -> EvenRecord | None:
+    """Channels where they overlap, at the instants of the fastest of them; None where they do not."""
     start = max(time[0] for time, _ in usable.values())
     end = min(time[-1] for time, _ in usable.values())
-    if end - start < least_s * (DECAY_LEAST if decays else 1.0):
-        return refuse(
-            f"its channels overlap for {max(end - start, 0.0):.2g} s", "look at the clocks of the channels"
-        )
-    rates = {name: (time.size - 1) / (time[-1] - time[0]) for name, (time, _) in usable.items()}
-    last = min(rates, key=lambda name: rates[name])
-    if rates[last] < LEAST_SAMPLES * highest_hz:
-        return refuse(
-            f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {highest_hz:g} Hz",
-            f"sample every channel at {4.0 * highest_hz:g} Hz or faster",
-        )
-    rate = min(max(rates.values()), _RATE_HZ / time_scale)
+    if end <= start:
+        return None
+    rates = {name: _rate(each) for name, each in usable.items()}
+    rate = min(max(rates.values()), most_hz)
     instants = start + np.arange(floor((end - start) * rate) + 1) / rate
-    even = {name: _at(instants, *each) for name, each in usable.items()}
-    if decays:
-        even |= {name: _resting(even.get(name), instants) for name in inputs}
+    if instants.size < _FEWEST:
+        return None
     noise = {
         name: (still.get(name) or roughness(values))
         * max(1.0, rate * (time[-1] - time[0]) / time.size) ** 0.5
         for name, (time, values) in usable.items()
     }
-    gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
-    lacking = set(even) - set(usable)
-    noise |= dict.fromkeys(lacking, 0.0)
-    gaps |= {name: [] for name in lacking}
-    found = EvenRecord(
-        recording.name, start, rate, rates[last], even, gaps, noise, REST_S * time_scale, decays
+    return EvenRecord(
+        test,
+        start,
+        rate,
+        min(rates.values()),
+        {name: _at(instants, *each) for name, each in usable.items()},
+        {name: _gaps(each[0], start) for name, each in usable.items()},
+        noise,
+        rest,
     )
-    return _let_go(found) if decays else found
 
 
-def _let_go(held: EvenRecord) -> EvenRecord:
-    """A decay from where the plant is let go: before that something holds it which nobody recorded."""
-    moves = [
-        np.abs(each - each[0]) > max(RESTING * np.ptp(each), _NOISY * held.noise[name])
-        for name, each in held.values.items()
-    ]
-    first = int(np.argmax(np.any(moves, axis=0)))
+def _released(held: EvenRecord, inputs: Mapping[str, _Samples]) -> EvenRecord:
+    """A decay from where the plant is released: before that something holds it which nobody recorded.
+
+    Its ``inputs`` are what they are in the mean from there on; those that were not recorded are not in it.
+    """
+    moves = np.zeros(held.count, bool)
+    for name, each in held.values.items():
+        away = np.abs(each - np.median(each[:_FEW]))
+        out = away > max(RESTING * np.ptp(each), _NOISY * held.noise[name])
+        # One sample alone is an outlier.
+        moves[:-_FEW] |= np.lib.stride_tricks.sliding_window_view(out, _FEW + 1)[: held.count - _FEW].all(
+            axis=1
+        )
+    first = int(np.argmax(moves))
     before = first / held.rate
-    if before < held.rest:
-        return held
+    if before < SOON * held.rest:
+        first, before = 0, 0.0
+    values = {name: each[first:] for name, each in held.values.items()}
+    count = held.count - first
+    for name, (time, each) in inputs.items():
+        later = each[time >= held.start + before]
+        if later.size:
+            values[name] = np.full(count, np.mean(later))
     return replace(
         held,
         start=held.start + before,
-        values={name: each[first:] for name, each in held.values.items()},
-        gaps={name: [(a - before, b - before) for a, b in each] for name, each in held.gaps.items()},
+        values=values,
+        gaps={name: [] for name in values}
+        | {name: [(a - before, b - before) for a, b in each] for name, each in held.gaps.items()},
+        noise=dict.fromkeys(values, 0.0) | held.noise,
+        decays=True,
     )
-
-
-def _resting(recorded: Array | None, instants: Array) -> Array:
-    """An input of a decay, at its mean: what it shows is noise. Of one that was not recorded that is zero."""
-    return np.full(instants.size, 0.0 if recorded is None else np.mean(recorded))
 
 
 def _at(instants: Array, time: Array, values: Array) -> Array:

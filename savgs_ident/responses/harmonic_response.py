@@ -59,21 +59,21 @@ WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 
 
 
 @dataclass(frozen=True)
-class Beginnings:
+class InitialStates:
     """The states with which D tests begin, where they are estimated, and what others would change in C channels.
 
     Attributes:
         states: of the plant, (D, m), in SI; zero for tests of which none is estimated.
-        changes: of the harmonics by one unit of each state [unit of the channel per SI unit], (D, C, K, m), channels
-            in the order of the plant's.
+        changes: of the harmonics by a typical size of each state [unit of the channel], (D, C, K, m), channels in the
+            order of the plant's.
     """
 
     states: NDArray[np.float64]
     changes: NDArray[np.complex128]
 
-    def of_tests(self, kept: NDArray[np.integer]) -> "Beginnings":
+    def of_tests(self, kept: NDArray[np.integer]) -> "InitialStates":
         """Of some of the tests, by their places."""
-        return Beginnings(self.states[kept], self.changes[kept])
+        return InitialStates(self.states[kept], self.changes[kept])
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class HarmonicResponse:
             times the reading, at every so many-th order; those of inputs are not. None where all tests are dwells.
         beside: mean of what was recorded beside the plant's channels in each test [its unit], (D,) by name; NaN
             where it was not.
-        beginnings: the states with which tests begin that do not begin at rest; None where none is estimated.
+        initial_states: the states with which tests begin that do not begin at rest; None where none is estimated.
     """
 
     tests: tuple[str, ...]
@@ -122,7 +122,7 @@ class HarmonicResponse:
     recorded: NDArray[np.float64] | None = None
     part: ComparedPart | None = None
     beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    beginnings: Beginnings | None = None
+    initial_states: InitialStates | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

@@ -23,7 +23,7 @@ def only_tests(response: HarmonicResponse, kept: NDArray[np.integer]) -> Harmoni
         covariance_dof=None if dof is None else dof[kept],
         recorded=None if recorded is None else recorded[kept],
         part=part,
-        beginnings=None if response.beginnings is None else response.beginnings.of_tests(kept),
+        initial_states=None if response.initial_states is None else response.initial_states.of_tests(kept),
         beside={name: each[kept] for name, each in response.beside.items()},
         **{name: getattr(response, name)[kept] for name in (*_BY_TEST, *_BY_ORDER)},
     )
@@ -66,7 +66,7 @@ def _without_windows(response: HarmonicResponse) -> HarmonicResponse:
     return replace(
         response,
         part=None,
-        beginnings=None,
+        initial_states=None,
         covariance_dof=None if dof is None else dof[:, :, :upto],
         **{name: getattr(response, name)[:, :, :upto] for name in _BY_ORDER},
     )

@@ -4,7 +4,7 @@ A window leads up to that part, in which its inputs are as they were recorded, a
 :data:`CLOSING_S` its inputs are led over to what they were before it began, so that they repeat.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
 from typing import NamedTuple
@@ -106,7 +106,7 @@ class Windows:
     def response(
         self,
         channels: tuple[str, ...],
-        inputs: set[str],
+        inputs: Collection[str],
         warnings: tuple[DataWarning, ...],
         highest_hz: float,
     ) -> HarmonicResponse:
@@ -127,7 +127,8 @@ class Windows:
                 picked = amplitudes[::step][: kept.size]
                 harmonics[w, c, : picked.size] = picked
                 covariance[w, c] = noise[w, c] ** 2 * variance * np.eye(2)
-                valid[w, c, : kept.size] = kept & (not self._has_gap(window, name))
+                alone = np.arange(kept.size) % self._apart(window) == 0 if name not in inputs else kept
+                valid[w, c, : kept.size] = kept & alone & (not self._has_gap(window, name))
         return HarmonicResponse(
             tests=tuple(self._name(each) for each in self.windows),
             channels=channels,
@@ -186,6 +187,10 @@ class Windows:
         last = floor(highest_hz * self.length)
         every = max(2, ceil(2 * len(self.windows) * readings * last / NUMBERS))
         return every, every * np.arange(last // every + 1) >= LOWEST_HZ / self.time_scale * self.length
+
+    def _apart(self, window: _Window) -> int:
+        """Every so many-th of the numbers of a window counts: those of a short part share their noise with more."""
+        return max(1, round(max(each.compared for each in self.windows) / window.compared))
 
     def _signal(self, window: _Window, name: str, led_over: bool) -> tuple[Array, Array]:
         """A channel at the instants of a window [its unit], and the share with which each counts [1], (n,) both.

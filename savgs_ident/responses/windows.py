@@ -11,7 +11,7 @@ begins at rest is compared from its beginning, for before it the rig rested: the
 Some tests do not last until their beginning is forgotten: those of a rig that forgets nothing, as one that sticks
 from step to step, short ones, and those in which the rig is released and left alone, where all that there is to see
 is how it forgets. Each of them is one window, from its beginning (:func:`estimate_whole_tests`); where it does not
-begin at rest, the state with which it begins is estimated (:mod:`savgs_ident.inference.beginnings`).
+begin at rest, the state with which it begins is estimated (:mod:`savgs_ident.inference.initial_states`).
 
 What is compared are complex amplitudes of the readings, weighted in time by a share that is zero outside that part
 (:func:`savgs_ident.responses.harmonic_response.compared_share`), recorded and predicted alike:
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, Recording, TestKind
-from savgs_ident.responses.even_record import LEAST_SAMPLES, EvenRecord, even_record
+from savgs_ident.responses.even_record import LEAST_SAMPLES, EvenRecord, even_record, is_decay
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import estimate_standstill_noise
 from savgs_ident.responses.selection import only_tests
@@ -92,10 +92,9 @@ def estimate_windows(
     """
     tests = _Tests.of(campaign, inputs, readings, highest_hz, kinds, time_scale)
     lead = LEAD_S * time_scale if lead_s is None else lead_s
-    first = lead + tests.closing
-    if tests.need_no_cut(COMPARED * lead * _NEAR):
+    first, driven = lead + tests.closing, [each for each in tests.records if not each.decays]
+    if tests.need_no_cut(driven, COMPARED * lead * _NEAR):
         return _whole(tests)
-    driven = [each for each in tests.records if not each.decays]
     found = [each.rested(first) if each.begins_at_rest else each for each in driven]
     compared = _compared_s([each.duration - first for each in found], COMPARED * lead, tests.least)
     if compared == 0.0:
@@ -104,7 +103,7 @@ def estimate_windows(
     short = [each for each in found if each.duration - first < compared]
     decays = [each for each in tests.records if each.decays]
     cut += [_from_its_beginning(each, lead + compared, lead) for each in (*short, *decays)]
-    return tests.response(cut)
+    return tests.response(cut, _all_shortened(campaign.source, decays, lead + compared))
 
 
 def estimate_whole_tests(
@@ -126,9 +125,7 @@ def _whole(tests: "_Tests") -> HarmonicResponse:
     if not tests.records:
         raise _no_test(tests.campaign, tests.warnings)
     lead, longest = LEAD_S * tests.time_scale, WHOLE_S * tests.time_scale
-    warnings = [
-        _shortened(tests.campaign.source, each, longest) for each in tests.records if each.duration > longest
-    ]
+    warnings = _all_shortened(tests.campaign.source, tests.records, longest)
     rested = [each.rested(lead + tests.closing) if each.begins_at_rest else each for each in tests.records]
     return tests.response([_from_its_beginning(each, longest, lead) for each in rested], warnings)
 
@@ -167,7 +164,7 @@ class _Tests:
         names = (*inputs, *readings)
         least, most = 2.0 * LOWEST_HZ / time_scale, MOST_HZ / time_scale
         usual = HIGHEST_HZ / time_scale
-        highest = _as_sampled(tests, names, usual) if wanted_hz is None else wanted_hz
+        highest = _as_sampled(tests, inputs, names, usual) if wanted_hz is None else wanted_hz
         if not least <= highest <= most:
             raise InputError(
                 f"windows cannot be compared up to {highest:g} Hz",
@@ -198,11 +195,9 @@ class _Tests:
         """Less than this is not worth a window."""
         return LEAST_S * self.time_scale
 
-    def need_no_cut(self, longest_s: float) -> bool:
-        """Whether there are some, each of which begins at rest and is no longer than a window may be [s]."""
-        return bool(self.records) and all(
-            each.begins_at_rest and self.least <= each.duration <= longest_s for each in self.records
-        )
+    def need_no_cut(self, driven: Sequence[EvenRecord], longest_s: float) -> bool:
+        """Whether each of those that are ``driven`` begins at rest and is no longer than a window may be [s]."""
+        return all(each.begins_at_rest and self.least <= each.duration <= longest_s for each in driven)
 
     def response(self, cut: Sequence[Cut], warnings: Sequence[DataWarning] = ()) -> HarmonicResponse:
         """What is compared in windows, with further warnings."""
@@ -217,7 +212,13 @@ class _Tests:
             told += (_noise_assumed(self.campaign.source, assumed),)
         windows = Windows.of(cut, self.time_scale)
         names = (*self.inputs, *self.readings)
-        channels = tuple(name for name in names if any(name in each.values for each in here))
+        # The inputs of a decay need not be recorded.
+        alone = any(each.decays for each in here)
+        channels = tuple(
+            name
+            for name in names
+            if any(name in each.values for each in here) or (alone and name == self.inputs[0])
+        )
         response = replace(
             windows.response(channels, set(self.inputs), told, self.highest_hz),
             recorded=windows.recorded(self.campaign),
@@ -226,12 +227,19 @@ class _Tests:
         return _with_readings(self.campaign.source, response, self.readings)
 
 
-def _as_sampled(tests: Sequence[Recording], names: Sequence[str], usual: float) -> float:
+def _as_sampled(
+    tests: Sequence[Recording], inputs: Sequence[str], names: Sequence[str], usual: float
+) -> float:
     """Up to which frequency is compared [Hz]: the usual one, or as far as the slowest channel is sampled.
 
     A channel that is sampled too slowly for a third of the usual is refused later, with what to do.
     """
-    rates = [each.channels[name].rate_hz for each in tests for name in names if name in each.channels]
+    rates = [
+        each.channels[name].rate_hz
+        for each in tests
+        for name in (names if not is_decay(each, inputs) else [one for one in names if one not in inputs])
+        if name in each.channels
+    ]
     slowest = min(rates, default=LEAST_SAMPLES * usual)
     fits = slowest >= LEAST_SAMPLES * usual or slowest < SAMPLES * usual / 3.0
     return usual if fits else slowest / SAMPLES
@@ -297,9 +305,14 @@ def _ends(duration: float, first: float, compared: float) -> list[float]:
     return [duration - place * compared for place in reversed(range(_count(duration - first, compared)))]
 
 
-def _shortened(source: str, even: EvenRecord, longest: float) -> DataWarning:
-    what = f"is compared in its first {longest:g} s only, for the model remembers how its motion began"
-    return _not_used(source, even, what, "cut it into several tests")
+def _all_shortened(source: str, records: Sequence[EvenRecord], longest: float) -> list[DataWarning]:
+    """Warnings about tests of which no more than the first seconds are compared [s]."""
+    what = f"is compared in its first {longest:.3g} s only"
+    return [
+        _not_used(source, each, what, "cut it into several tests, if what comes later matters")
+        for each in records
+        if each.duration > longest
+    ]
 
 
 def _not_used(source: str, even: EvenRecord, what: str, remedy: str) -> DataWarning:

@@ -296,7 +296,7 @@ def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance:
     return Trajectory(dx, imbalance + apply_nodes(lin.slope, dx))
 
 
-def begun_otherwise(layout: Layout, lin: Linearised, change: Float[Array, "m D"]) -> Trajectory:
+def changed_initial_states(layout: Layout, lin: Linearised, change: Float[Array, "m D"]) -> Trajectory:
     """Changes (dx, dy) of windows that begin with a given state, by a ``change`` of that state [SI]; others stay."""
     opened, first = list(layout.opened), layout.starts[list(layout.opened)]
     inverse = jnp.moveaxis(lin.inverse[:, :, first], -1, 0)

@@ -20,6 +20,7 @@ from savgs_ident.plants.base import AbstractPlant, Input
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion, joined
+from savgs_ident.responses.even_record import is_decay
 from savgs_ident.responses.recorded_motion import recorded_motion, recorded_speed
 from savgs_ident.simulate.along_motion import Samples, force_gain
 
@@ -46,7 +47,8 @@ def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
 
     Not where there are dwells, whose response it predicts, or decays, which no drive drives.
     """
-    predicted = campaign.of_kind("dwell") or campaign.of_kind("decay")
+    drive = [model.plant.inputs[0].name]
+    predicted = campaign.of_kind("dwell") or any(is_decay(each, drive) for each in campaign.recordings)
     return is_driven(model.plant) and not predicted and bool(_reading(model.plant))
 
 

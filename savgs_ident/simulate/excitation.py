@@ -237,7 +237,7 @@ def measured_excitation(
         for each, mean in zip(plant.inputs, kept, strict=True)
     }
     part = None if measured.part is None else cast(Any, ComparedPart)(*map(jnp.asarray, measured.part))
-    begun = None if measured.beginnings is None else jnp.asarray(measured.beginnings.states)
+    begun = None if measured.initial_states is None else jnp.asarray(measured.initial_states.states)
     return Excitation(jnp.asarray(measured.frequency), harmonics, part, begun)
 
 
@@ -260,7 +260,7 @@ def only_driven(excitation: Excitation, kept: NDArray[np.intp]) -> Excitation:
     if part.repeats.all():
         few = {name: _that_move(each) for name, each in harmonics.items()}
         return Excitation(excitation.frequency[kept], few)
-    begun = None if excitation.beginnings is None else excitation.beginnings[kept]
+    begun = None if excitation.initial_states is None else excitation.initial_states[kept]
     windows = cast(Any, ComparedPart)(*map(jnp.asarray, part))
     return Excitation(excitation.frequency[kept], harmonics, windows, begun)
 
@@ -407,7 +407,10 @@ def _with_inputs(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant])
     kept = tuple(
         each
         for each in campaign.recordings
-        if each.kind in ("standstill", "decay") or all(name in each.channels for name in known)
+        if each.kind == "standstill"
+        or all(
+            name in each.channels for name in known if each.kind != "decay" or name != plant.inputs[0].name
+        )
     )
     return replace(campaign, recordings=kept)
 

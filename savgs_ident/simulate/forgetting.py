@@ -87,10 +87,10 @@ def _forgetting(
     Raises :class:`InputError` where it forgets in none of those that do not begin at rest.
     """
     left, half, motion = _left(response, model)
-    begun = _begun(response)
-    if begun.any() and np.min(left[begun]) >= REMEMBERED and isinstance(measured, Campaign):
+    unknown = _with_unknown_start(response)
+    if unknown.any() and np.min(left[unknown]) >= REMEMBERED and isinstance(measured, Campaign):
         scale = scale_of_time(model.build())
-        lead = _longer(scale, float(np.median(half[begun])), float(np.median(left[begun])))
+        lead = _longer(scale, float(np.median(half[unknown])), float(np.median(left[unknown])))
         progress(f"cutting windows of which the first {lead:.3g} s are not compared")
         response = in_windows(partial(estimate_windows, lead_s=lead))
         if response.part is None:
@@ -119,7 +119,7 @@ def _in_whole_tests(
     return lasting, motion if lasting is response else None
 
 
-def _begun(response: HarmonicResponse) -> NDArray[np.bool_]:
+def _with_unknown_start(response: HarmonicResponse) -> NDArray[np.bool_]:
     """Which of the windows begin with a state that is to be forgotten, (w,)."""
     assert response.part is not None
     return ~response.part.opens[response.windows]
@@ -135,12 +135,12 @@ def _left(
     assert response.part is not None
     plant, p = model.build(), as_values(model.table.as_dict())
     solution = simulate_periodic(plant, p, measured_excitation(plant, response, model.table))
-    begin, begun = response.part.begin, _begun(response)
+    begin, unknown = response.part.begin, _with_unknown_start(response)
 
     def after(upto: NDArray[np.float64]) -> NDArray[np.float64]:
         left = remembered(solution, upto)
         # Where it is known or estimated how a motion began, there may be none all the same.
-        return np.where(begun | ~np.isfinite(left), left, 0.0)
+        return np.where(unknown | ~np.isfinite(left), left, 0.0)
 
     return after(begin), after(0.5 * begin), solution
 
@@ -168,15 +168,15 @@ def _longer(time_scale: float, half: float, left: float) -> float:
 
 def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicResponse:
     """The windows of which less than :data:`REMEMBERED` is ``left``."""
-    forgotten, begun = left < REMEMBERED, _begun(response)
+    forgotten, unknown = left < REMEMBERED, _with_unknown_start(response)
     if not np.isfinite(left).any():
         raise InputError(
             "the model has no motion that follows the recorded one in any window",
             remedy="begin with a model that was identified from dwells, or record a sweep or a road without steps",
         )
-    if not forgotten.any() or (begun.any() and not forgotten[begun].any()):
+    if not forgotten.any() or (unknown.any() and not forgotten[unknown].any()):
         raise InputError(
-            f"the model remembers {100.0 * np.min(left[begun]):.2g} % of how a motion began where windows are "
+            f"the model remembers {100.0 * np.min(left[unknown]):.2g} % of how a motion began where windows are "
             "compared",
             remedy="record tests that begin with a second of rest, or dwells",
         )

@@ -295,7 +295,7 @@ def _with_windows_marched(
     opened = mesh.layout.starts[list(mesh.layout.opened)]
     if opened.size:
         start = start._replace(x=_resting(model, p, excitation, mesh, start.x, opened))
-    start = with_beginnings(start, excitation, mesh.layout)
+    start = with_initial_states(start, excitation, mesh.layout)
     first = start.x[:, mesh.layout.starts[windows]]
     marched = march(model, p, model.prepare(p), only_driven(excitation, windows), theirs, first)
     return Trajectory(
@@ -306,12 +306,12 @@ def _with_windows_marched(
     )
 
 
-def with_beginnings(at: Trajectory, excitation: Excitation, layout: Layout) -> Trajectory:
+def with_initial_states(at: Trajectory, excitation: Excitation, layout: Layout) -> Trajectory:
     """A trajectory with the states with which tests begin that do not begin at rest, where they are known."""
-    if excitation.beginnings is None:
+    if excitation.initial_states is None:
         return at
-    places, count = excitation.moving, excitation.beginnings.shape[1]
-    return at._replace(x=at.x.at[:count, layout.starts[places]].set(excitation.beginnings[places].T))
+    places, count = excitation.moving, excitation.initial_states.shape[1]
+    return at._replace(x=at.x.at[:count, layout.starts[places]].set(excitation.initial_states[places].T))
 
 
 @eqx.filter_jit

@@ -21,7 +21,7 @@ from savgs_ident.responses.harmonic_response import ComparedPart
 from savgs_ident.simulate.collocation import (
     Trajectory,
     apply_nodes,
-    begun_otherwise,
+    changed_initial_states,
     node_motion,
     residual_at_nodes,
     solve_linearised,
@@ -243,7 +243,7 @@ def answers(
 
 
 @eqx.filter_jit
-def changes_of_beginnings(
+def changes_by_initial_states(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int, states: int
 ) -> Complex[Array, "D C K m"]:
     """Changes of the harmonics 0..orders by one unit of each of the first ``states`` with which tests begin.
@@ -256,7 +256,7 @@ def changes_of_beginnings(
 
     def along(state: Array) -> Array:
         change = jnp.zeros((at.x.shape[0], moving.size)).at[state].set(moving)
-        motions = begun_otherwise(layout, solution.linearised, change)
+        motions = changed_initial_states(layout, solution.linearised, change)
         answer: Array = jax.jvp(
             lambda found: harmonics_of(model, p, found, solution, orders), (at,), (motions,)
         )[1]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Origin
+from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.public import Asked, AskedMotion, NoiseLevels
 from savgs_ident.inference.background.constants import BACKGROUND
@@ -73,12 +74,18 @@ class RecalibratedCampaign:
         noise = min(scales.noise, exp(MOST_TRUST * known.data.scales.noise_trust))
         measured = rows + known.data.draw_errors(noise, errs, random)
         data = replace(known.data, measured=measured, variance=self._estimated_variance(random))
-        search = search_of(known.plant, data)
+        plant = known.plant.seeing(measured) if isinstance(known.plant, DwellProblem) else known.plant
+        search = search_of(plant, data)
         base = find_map(search, (), known.base.values, known.base.prediction.warm_start)
         if not base.solved:
             return None
         return replace(
-            known, data=data, search=search, given=base.prediction.rows, base=refine(search, base, ())
+            known,
+            plant=plant,
+            data=data,
+            search=search,
+            given=base.prediction.rows,
+            base=refine(search, base, ()),
         )
 
     def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Roads: the spectrum and the variance that ISO 8608 gives them, the bump's shape and timing, soft beginnings."""
+"""Roads: the spectrum and the variance that ISO 8608 gives them, the bump's shape and timing, soft initial_states."""
 
 from itertools import pairwise
 
