@@ -10,7 +10,9 @@ with the small errors that every model has (:mod:`savgs_ident.fit.small_errors`)
 """
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -192,16 +194,17 @@ def fit_least_squares(
     settings: FitSettings | None = None,
     origin: Origin = NO_ORIGIN,
     motion: PeriodicSolution | None = None,
+    values: Mapping[str, float] = MappingProxyType({}),
     begin: Float[Array, " n"] | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit ``free`` parameters of a model to a measured response.
 
     ``origin`` is that of the result; ``motion`` is that of the model as given in the same tests, where it is known
-    already; the search goes on from the free coordinates ``begin`` where these were found before, and no other
-    start is tried; ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not
-    exist or that the model does not use, for a response that cannot be used, and for a plant that may be anywhere, as
-    no force brings it back. Look at ``trusted`` of the result.
+    already; the search begins with the ``values`` [SI] that are given, or goes on from the free coordinates ``begin``
+    where these were found before, and no other start is tried; ``progress`` is called with what is being done. Raises
+    :class:`InputError` for names that do not exist or that the model does not use, for a response that cannot be
+    used, and for a plant that may be anywhere, as no force brings it back. Look at ``trusted`` of the result.
     """
     began, report = time.perf_counter(), progress or _silent
     settings = settings or FitSettings()
@@ -215,11 +218,10 @@ def fit_least_squares(
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     report("preparing the fit")
     minimiser = Minimiser(problem)
-    first_u, *others = _starts(task, settings.starts) if begin is None else [begin]
-    if begin is not None:
-        first = simulate_periodic(
-            problem.model, problem.parameters(begin), task.excitation, settings.periodic
-        )
+    first_u, *others = _starts(task, settings.starts, values) if begin is None else [begin]
+    if begin is not None or values:
+        p = problem.parameters(first_u)
+        first = simulate_periodic(problem.model, p, task.excitation, settings.periodic)
     tried = [minimiser.minimise(first_u, first, settings.steps, report, enough=ROUGHLY)]
     for u in others:
         if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:
@@ -257,10 +259,10 @@ def _silent(line: str) -> None:
     del line
 
 
-def _starts(task: Task, most: int) -> list[Array]:
-    """The model's values, then points to alternating sides of them in the free coordinates."""
+def _starts(task: Task, most: int, values: Mapping[str, float]) -> list[Array]:
+    """The values given [SI], or the model's, then points to alternating sides of them in the free coordinates."""
     free = task.problem.free
-    first = free.to_unconstrained(task.table.as_dict())
+    first = free.to_unconstrained(dict(task.table.as_dict()) | dict(values))
     count, starts = len(free.identified), [first]
     for number in range(1, most):
         signs = [1.0 if (number >> (place % 4)) & 1 else -1.0 for place in range(count)]

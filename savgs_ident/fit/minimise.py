@@ -43,7 +43,7 @@ its units of information on every coordinate: a whole standard deviation would h
 which data and prior together hardly hold more."""
 
 
-IN_VAIN = 8
+IN_VAIN = 16
 """Steps in a row that lead no lower, after which no further one is tried: each is a quarter of the one before it."""
 
 NOTHING = 1e-10

@@ -60,8 +60,8 @@ def fit(
     """Identify a model: parameters with errors, how well they fit, what the data identify.
 
     Args:
-        model: the rig, or another plant, with its effects; one that was identified before starts from what was known
-            then, for its values would count the data twice.
+        model: the rig, or another plant, with its effects; the search begins with the values of one that was
+            identified before, but its priors are those of what was known then, or the data would count twice.
         measured: the recordings, or the response of their dwells. A road is cut into windows, and without dwells so
             is a sweep; without dwells a plant with one coordinate, driven by its first input, is held against the
             force of its drive along the measured motion, or along one that is given.
@@ -147,9 +147,11 @@ def fit_with(
     # Beside other programs threads of the linear algebra wait for each other: its largest matrices take thirty times
     # as long, and on cores that are free they gain a tenth of a second.
     with threadpool_limits(1, "blas"):
-        begin = None
+        values, begin = {} if model.is_drawing else model.identified[1], None
         if response.initial_states is not None:
-            response, begin = settle_initial_states(response, drawing, names, settings.problem, progress)
+            response, begin = settle_initial_states(
+                response, drawing, names, settings.problem, progress, values
+            )
         return fit_least_squares(
             response,
             drawing,
@@ -157,6 +159,7 @@ def fit_with(
             settings=settings,
             origin=origin,
             motion=motion,
+            values=values,
             begin=begin,
             progress=progress,
         )

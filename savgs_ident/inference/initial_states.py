@@ -9,8 +9,9 @@ States that slide, as the anchor of a contact that sticks, begin where nothing s
 them forget it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import equinox as eqx
@@ -164,8 +165,9 @@ def settle_initial_states(
     free: tuple[str, ...],
     settings: ProblemSettings,
     progress: Progress = no_progress,
+    values: Mapping[str, float] = MappingProxyType({}),
 ) -> Settled:
-    """The initial states of tests, estimated along with ``free`` parameters of a model.
+    """The initial states of tests, estimated along with ``free`` parameters of a model, from ``values`` [SI].
 
     ``response`` has those that go with the model as given, which stay where the model lacks a motion in any test.
     """
@@ -189,8 +191,9 @@ def settle_initial_states(
 
         return _Point(there.solution, there.status.ok, np.append(missed, begin / WIDTH), slopes)
 
-    u = np.asarray(problem.free.to_unconstrained(task.table.as_dict()))
-    first = simulate_periodic(plant, problem.fixed, task.excitation, settings.periodic)
+    u = np.asarray(problem.free.to_unconstrained(dict(task.table.as_dict()) | dict(values)))
+    p = problem.parameters(jnp.asarray(u))
+    first = simulate_periodic(plant, p, task.excitation, settings.periodic)
     z, point, ended = _lowest(at, np.concatenate([u, states.of(plant, first)]), first)
     if not point.solved:
         return Settled(response, None)
@@ -206,7 +209,7 @@ class FreeInitialStates:
     As numbers that are searched they stand one after the other, each in its typical size, (w m,).
 
     Attributes:
-        target: what is compared, in which initial states count like anything else.
+        target: what is compared, in which initial states count like anything else, and offsets of sensors do not.
         moving: places of the tests, (w,).
     """
 
@@ -271,7 +274,7 @@ class FreeInitialStates:
         tests, each, count = by_test.shape
         found = np.zeros((tests, each, self.moving.size, count))
         found[self.moving, :, np.arange(self.moving.size)] = by_test[self.moving]
-        return found.reshape(tests * each, -1)
+        return np.asarray(self.target.projected(jnp.asarray(found.reshape(tests * each, -1))))
 
     def best(self, model: AbstractPlant, p: Values, solution: PeriodicSolution) -> PeriodicSolution:
         """The motion that begins as it misses least, from one nearby; that one where none is found."""

@@ -27,7 +27,7 @@ from savgs_ident.effects.base import InputSignal
 from savgs_ident.inference.observations import spanned
 from savgs_ident.plants.base import AbstractPlant, Channel, Excitation, Motion
 from savgs_ident.plants.model import Model
-from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak, share_amplitudes
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve
 from savgs_ident.simulate.program_cache import placed, run_cached
@@ -42,7 +42,7 @@ class HarmonicTarget(eqx.Module):
     ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it. ``decay`` (C,) is the power
     of the order with which a discrepancy of the model falls in each channel of dwells; in ``windows``, by their
     places, it is a share of what is near it. ``nuisance`` (m, t) are directions of the residuals, perpendicular and
-    of length one, in which these say nothing: what other initial states of tests would change.
+    of length one, in which these say nothing: what offsets of sensors and other initial states would change.
     """
 
     measured: Complex[Array, "D C K"]
@@ -56,8 +56,13 @@ class HarmonicTarget(eqx.Module):
         """Residuals in standard deviations, (D * C * (n + 1) * 2,)."""
         miss = predicted - self.measured
         parts = jnp.stack([miss.real, miss.imag], axis=-1)
-        found = jnp.einsum("dckij,dckj->dcki", self.whitening, parts).ravel()
-        return found if self.nuisance is None else found - self.nuisance @ (self.nuisance.T @ found)
+        return self.projected(jnp.einsum("dckij,dckj->dcki", self.whitening, parts).ravel())
+
+    def projected(self, residuals: Float[Array, " m"]) -> Float[Array, " m"]:
+        """Residuals, or changes of them, [sd] without what nuisances make of them."""
+        if self.nuisance is None:
+            return residuals
+        return residuals - self.nuisance @ (self.nuisance.T @ residuals)
 
     @property
     def size(self) -> int:
@@ -66,7 +71,7 @@ class HarmonicTarget(eqx.Module):
 
     @property
     def entries(self) -> int:
-        """Real numbers compared, less those that other initial states could make anything."""
+        """Real numbers compared, less those that nuisances could make anything."""
         return 2 * int(self.used.sum()) - (0 if self.nuisance is None else self.nuisance.shape[1])
 
 
@@ -140,20 +145,35 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
         used,
         tuple(each.decay for each in channels),
         tuple(measured.windows.tolist()),
-        None
-        if measured.initial_states is None
-        else _nuisance(np.asarray(whitening, np.float64), measured.initial_states.changes[:, :, :count]),
+        _nuisances(np.asarray(whitening, np.float64), measured, len(channels), count - 1),
     )
 
 
-def _nuisance(whitening: NDArray[np.float64], changes: NDArray[np.complex128]) -> Float[Array, "m t"]:
-    """Directions of the residuals, perpendicular and of length one, that span ``changes`` (D, C, K, m)."""
+def _nuisances(
+    whitening: NDArray[np.float64], measured: HarmonicResponse, channels: int, orders: int
+) -> Float[Array, "m t"] | None:
+    """Directions of the residuals, perpendicular and of length one, in which tests that begin moving say nothing.
+
+    What other initial states would change, where these are known, and offsets of sensors: a decay is short, and its
+    mean no mean over time. None where no test begins so.
+    """
+    if measured.part is None or not measured.part.begins_moving.any():
+        return None
+    tests, count = len(measured.tests), orders + 1
+    moving = np.flatnonzero(measured.part.begins_moving)
+    offsets = np.zeros((tests, channels, count, channels), np.complex128)
+    offsets[moving] = np.einsum(
+        "dk,ce->dcke", share_amplitudes(measured.part, orders)[moving], np.eye(channels)
+    )
+    changes = offsets
+    if measured.initial_states is not None:
+        changes = np.concatenate([offsets, measured.initial_states.changes[:, :, :count]], axis=-1)
     found = []
     for place, each in enumerate(whitened(whitening, changes)):
         kept = spanned(each)
-        columns = np.zeros((len(changes), *kept.shape))
+        columns = np.zeros((tests, *kept.shape))
         columns[place] = kept
-        found.append(columns.reshape(-1, kept.shape[1]))
+        found.append(columns.reshape(tests * kept.shape[0], kept.shape[1]))
     return jnp.asarray(np.concatenate(found, axis=1))
 
 

@@ -55,6 +55,7 @@ class EvenRecord:
         rest: at its beginning it has to rest so long to be taken for one that rested before [s].
         decays: whether nothing drives the plant in it, which was set in motion before.
         before: how much of it is rest before the test began [s].
+        after: how long after the test began it begins [s].
     """
 
     test: str
@@ -67,6 +68,7 @@ class EvenRecord:
     rest: float
     decays: bool = False
     before: float = 0.0
+    after: float = 0.0
 
     @property
     def count(self) -> int:
@@ -253,6 +255,7 @@ def _released(held: EvenRecord, inputs: Mapping[str, _Samples]) -> EvenRecord:
         | {name: [(a - before, b - before) for a, b in each] for name, each in held.gaps.items()},
         noise=dict.fromkeys(values, 0.0) | held.noise,
         decays=True,
+        after=before,
     )
 
 

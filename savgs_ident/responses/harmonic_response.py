@@ -242,6 +242,18 @@ def compared_share(
     return share
 
 
+def share_amplitudes(part: ComparedPart, orders: int) -> NDArray[np.complex128]:
+    """Orders 0..``orders`` of a reading that is one throughout each of D tests [1], (D, orders + 1)."""
+    count = 8 * (1 + int(np.max(part.every)) * (orders + 1))
+    phase = 2.0 * np.pi * np.arange(count) / count
+    found = np.zeros((part.begin.size, orders + 1), np.complex128)
+    for place, (begin, end, every) in enumerate(zip(part.begin, part.end, part.every, strict=True)):
+        spectrum = 2.0 / count * np.fft.rfft(compared_share(phase, begin, end))
+        found[place] = spectrum[:: int(every)][: orders + 1]
+    found[:, 0] *= 0.5
+    return found
+
+
 DEFAULT_SAMPLES = 512
 """Points in a period: the extreme of a component of order k is found to within (pi k / 512)^2 / 2 of its own
 amplitude."""

@@ -174,7 +174,7 @@ class Windows:
 
     def _begin(self, window: _Window) -> float:
         """Where what is compared in a window begins [s after its test did]."""
-        return window.first / window.record.rate + window.lead - window.record.before
+        return window.first / window.record.rate + window.lead + window.record.after - window.record.before
 
     def _name(self, window: _Window) -> str:
         # Rounded to what is printed, and no negative zero.

@@ -22,8 +22,11 @@ from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 REMEMBERED = 0.01
 """Largest share of how a motion began that may be left where the comparison in a window begins [1]."""
 
-LONGEST_LEAD_S = 45.0
-"""The longest lead that is tried [s], for a plant whose time scale is 1. Origin: computing time."""
+LONGEST_LEAD_S = 9.0
+"""The longest lead that is tried [s], for a plant whose time scale is 1.
+
+Origin: as long as what is compared. Where more would be needed, it is better to estimate how motions begin.
+"""
 
 ENDURED = 0.5
 """Part of :data:`REMEMBERED` that a longer lead is to leave: a fit may find less damping than it begins with."""
