@@ -12,7 +12,7 @@ them forget it.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -65,31 +65,22 @@ def compared_motion(
     orders: int,
     max_frequency: float | None = None,
     progress: Progress = no_progress,
+    identified: Model | None = None,
 ) -> tuple[HarmonicResponse, PeriodicSolution | None]:
-    """The response that a model is compared with, with estimated initial states, and the model's motion in all tests.
+    """The response that a model is compared with, and the model's motion in all tests where that is known.
 
-    That is None where there are dwells alone, and where it is not known. Raises :class:`InputError` as
-    :func:`savgs_ident.simulate.forgetting.forgetful_motion` does.
+    Its initial states are those that go with the model, or with one that is ``identified`` where that is given.
+    Raises :class:`InputError` as :func:`savgs_ident.simulate.forgetting.forgetful_motion` does.
     """
     response, motion = forgetful_motion(measured, model, orders, max_frequency, progress)
     if response.part is None or not response.part.begins_moving.any():
         return response, motion
-    return estimate_initial_states(response, model, orders, progress), None
+    return estimate_initial_states(response, identified or model, orders, progress), None
 
 
-def compared_response(
-    measured: Measurements,
-    model: Model,
-    orders: int,
-    max_frequency: float | None = None,
-    progress: Progress = no_progress,
-    identified: Model | None = None,
-) -> HarmonicResponse:
-    """The response alone, with the initial states that go with an ``identified`` model where it is given."""
-    response, _ = forgetful_motion(measured, model, orders, max_frequency, progress)
-    if response.part is None or not response.part.begins_moving.any():
-        return response
-    return estimate_initial_states(response, identified or model, orders, progress)
+def compared_response(*args: Any, **options: Any) -> HarmonicResponse:
+    """The response of :func:`compared_motion` alone."""
+    return compared_motion(*args, **options)[0]
 
 
 def estimate_initial_states(
