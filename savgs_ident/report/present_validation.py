@@ -199,7 +199,7 @@ CALIBRATION_STUDY = _CalibrationStudy()
 
 def plant_check_record(check: PlantCheck) -> dict[str, Any]:
     """What was found, what the plant declares, and at which frequencies it was looked at [Hz]."""
-    plant, free, tolerant, exact = check.model.plant, *_known(check)
+    plant, free, tolerant, typical, exact = check.model.plant, *_known(check)
     return {
         "schema": 1,
         "plant": check.model.plant_name,
@@ -215,6 +215,7 @@ def plant_check_record(check: PlantCheck) -> dict[str, Any]:
         "effects": list(check.model.catalogue),
         "identified": free,
         "known_to_tolerance": tolerant,
+        "known_to_an_order_of_magnitude": typical,
         "exact": exact,
         "command": check.origin.command_line,
     }
@@ -222,15 +223,15 @@ def plant_check_record(check: PlantCheck) -> dict[str, Any]:
 
 def plant_check_text(check: PlantCheck) -> RenderableType:
     """The same as sentences and a table of findings."""
-    plant, free, tolerant, exact = check.model.plant, *_known(check)
+    plant, free, tolerant, typical, exact = check.model.plant, *_known(check)
     natural = ", ".join(f"{each:.3g}" for each in check.natural_frequencies)
     parts = [
         f"{check.model.plant_name}: coordinates {_names(each.name for each in plant.coordinates)}; inputs "
         f"{_names(each.name for each in plant.inputs)}; channels {_names(each.name for each in plant.channels)}.",
         f"Ports: {_names(each.name for each in plant.ports)}; {len(check.model.catalogue)} effects can be looked "
         "for there.",
-        f"A fit identifies {_names(free)}; known to a tolerance: {_names(tolerant)}; taken as exact: "
-        f"{_names(exact)}.",
+        f"A fit identifies {_names(free)}; known to a tolerance: {_names(tolerant)}; to an order of magnitude: "
+        f"{_names(typical)}; taken as exact: {_names(exact)}.",
         *([f"Natural frequencies near its rest: {natural} Hz."] if natural else []),
     ]
     found: RenderableType = plain("No faults, and nothing else to say.")
@@ -240,17 +241,18 @@ def plant_check_text(check: PlantCheck) -> RenderableType:
     return Group(*(plain(each) for each in parts), plain(""), found)
 
 
-def _known(check: PlantCheck) -> tuple[list[str], list[str], list[str]]:
-    """Names of parameters that a fit identifies, that are known to a tolerance, and that it takes as exact."""
+def _known(check: PlantCheck) -> tuple[list[str], ...]:
+    """Names of parameters that a fit identifies, known to a tolerance, to an order of magnitude, and exact."""
     entries = check.model.table.entries
     open_ones = [
         each.name
         for each in entries
         if each.tolerance == 0.0 and isfinite(each.lower) and isfinite(each.upper)
     ]
-    tolerant = [each.name for each in entries if each.tolerance > 0.0]
-    exact = [each.name for each in entries if each.name not in (*open_ones, *tolerant)]
-    return open_ones, tolerant, exact
+    typical = [each.name for each in entries if each.is_typical]
+    tolerant = [each.name for each in entries if each.tolerance > 0.0 and not each.is_typical]
+    exact = [each.name for each in entries if each.name not in (*open_ones, *tolerant, *typical)]
+    return open_ones, tolerant, typical, exact
 
 
 def _names(names: Iterable[str]) -> str:
