@@ -168,6 +168,7 @@ def test_a_decay_begins_where_the_rig_is_let_go(model: si.PlantModel) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_short_road_is_compared_from_its_beginning(model: si.PlantModel) -> None:
     road = campaign(seconds=9.0)
     late = [
@@ -186,6 +187,7 @@ def test_a_short_road_is_compared_from_its_beginning(model: si.PlantModel) -> No
         assert abs(found[name].value - PARAMETERS[name].value) < 4.0 * found[name].stderr
 
 
+@pytest.mark.slow
 def test_of_a_plant_that_forgets_nothing_tests_may_begin_moving() -> None:
     ringing = si.PlantModel(TwoMass(), PARAMETERS.with_values({"c": 40.0, "c_t": 0.0}))
     time = np.arange(8000) / RATE
