@@ -23,7 +23,7 @@ from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import comparable, gaps
 from savgs_ident.inference.laplace import spread_of
-from savgs_ident.inference.problem import Pins, Problem, Task
+from savgs_ident.inference.problem import HarmonicTarget, Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
@@ -349,6 +349,8 @@ def _misfit(task: Task, best: Minimum) -> float:
     """By how much the model misses beyond the noise, as a share of the response [1], channels pooled."""
     problem, measured = task.problem, task.measured
     predicted = np.array(harmonics(problem.model, problem.parameters(best.u), best.solution, problem.orders))
+    if isinstance(problem.target, HarmonicTarget):
+        predicted = problem.target.with_nuisances(predicted)
     names = [each.name for each in problem.model.channels]
     used = comparable(measured, names, problem.orders)
     gap = gaps(measured, names, predicted, used)["together"]

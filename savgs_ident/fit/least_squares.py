@@ -13,11 +13,12 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
@@ -36,7 +37,15 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
-from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
+from savgs_ident.inference.problem import (
+    HarmonicTarget,
+    Problem,
+    ProblemSettings,
+    Quantity,
+    Target,
+    Task,
+    plan_task,
+)
 from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -114,15 +123,21 @@ def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
         measured=task.measured,
         orders=min(problem.orders, task.settings.orders) if task.measured.dwells.size else problem.orders,
         used=np.array(problem.target.used),
-        predicted=np.array(harmonics(problem.model, p, best.solution, problem.orders)),
+        predicted=_read(problem.target, harmonics(problem.model, p, best.solution, problem.orders)),
         frictionless=frictionless,
         frictionless_status=frictionless_status,
-        as_given=np.array(outcome.as_given),
+        as_given=_read(problem.target, outcome.as_given),
         starts=tuple((each.cost, each.status) for each in outcome.tried),
         quantity=task.settings.quantity,
         wall_s=outcome.wall_s,
         origin=origin,
     )
+
+
+def _read(target: Target, predicted: Any) -> NDArray[np.complex128]:
+    """Predicted harmonics (D, C, K) [unit of each] as sensors with offsets read them, where these do not count."""
+    found = np.array(predicted)
+    return target.with_nuisances(found) if isinstance(target, HarmonicTarget) else found
 
 
 def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.ndarray]:

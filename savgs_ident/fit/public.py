@@ -20,6 +20,7 @@ from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
 from savgs_ident.inference.initial_states import compared_motion, compared_response, settle_initial_states
 from savgs_ident.inference.port_sizes import sized_to
+from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
@@ -281,6 +282,12 @@ def compare(
     with_effects = simulate_response(model, excitation, shown)
     progress("solving it without effects")
     frictionless = simulate_response(disable_effects(model), excitation, shown)
+    if response.part is not None and response.part.begins_moving.any():
+        target = harmonic_target(response, model.plant.channels, orders)
+        with_effects, frictionless = (
+            replace(each, harmonics=target.with_nuisances(each.harmonics))
+            for each in (with_effects, frictionless)
+        )
     used = comparable(response, names, shown) & with_effects.ok[:, None, None]
     origin = model.origin(campaign_of(measured), response.warnings)
     return Comparison(response, with_effects, frictionless, used, origin=origin)

@@ -64,6 +64,19 @@ class HarmonicTarget(eqx.Module):
             return residuals
         return residuals - self.nuisance @ (self.nuisance.T @ residuals)
 
+    def with_nuisances(self, predicted: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Predicted harmonics (D, C, K) [unit of each] as near the measured ones as nuisances make them."""
+        if self.nuisance is None:
+            return predicted
+        whitening, measured = np.asarray(self.whitening), np.asarray(self.measured)
+        miss = np.stack([(predicted - measured).real, (predicted - measured).imag], axis=-1)
+        rows = np.einsum("dckij,dckj->dcki", whitening, miss).ravel()
+        along = np.asarray(self.nuisance) @ (np.asarray(self.nuisance).T @ rows)
+        unused = np.all(whitening == 0.0, axis=(-2, -1), keepdims=True)
+        back = np.linalg.inv(whitening + unused * np.eye(2))
+        parts = np.einsum("dckij,dckj->dcki", back, along.reshape(miss.shape))
+        return np.asarray(predicted - (parts[..., 0] + 1j * parts[..., 1]))
+
     @property
     def size(self) -> int:
         """Residuals, those of unused entries included."""

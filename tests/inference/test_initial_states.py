@@ -350,3 +350,31 @@ def test_so_many_numbers_are_independent_less() -> None:
 @pytest.mark.parametrize("name", ["decay_1", "Release up", "pluck-3", "ring_down", "free vibration 2"])
 def test_decays_are_known_by_their_names(name: str) -> None:
     assert classify_test(name) == ("decay", None)
+
+
+def test_offsets_of_sensors_are_no_gap(model: si.PlantModel) -> None:
+    made = decays()
+    off = {"body_accel": 0.15, "susp_deflection": 6e-4}
+    tests = tuple(
+        replace(
+            test,
+            channels={
+                name: replace(each, values=each.values + off[name]) for name, each in test.channels.items()
+            },
+        )
+        for test in made.recordings
+    )
+    plain, shifted = (si.compare(model, replace(made, recordings=each)) for each in (made.recordings, tests))
+
+    def missed(found: si.Comparison) -> float:
+        orders = found.used.shape[2]
+        off = (found.measured.harmonics[:, 1:, :orders] - found.model.harmonics)[found.used]
+        return float(
+            np.linalg.norm(off) / np.linalg.norm(found.measured.harmonics[:, 1:, :orders][found.used])
+        )
+
+    assert missed(shifted) == pytest.approx(missed(plain), rel=0.05)
+    orders, kept = plain.used.shape[2], plain.used
+    noise = np.trace(plain.measured.covariance[:, 1:, :orders], axis1=-2, axis2=-1)[kept].sum()
+    size = np.sum(np.abs(plain.measured.harmonics[:, 1:, :orders][kept]) ** 2)
+    assert missed(plain) < 1.3 * np.sqrt(noise / size)
