@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import savgs_ident as si
@@ -236,37 +235,6 @@ def test_a_posterior_of_decays_holds_the_truth(model: si.PlantModel) -> None:
         assert abs(found[name].median - value) < 4.0 * found[name].sd
     inside, count = found.count_inside
     assert 0.8 * count < inside < count
-
-
-@pytest.mark.slow
-def test_a_friction_is_found_in_decays(model: si.PlantModel) -> None:
-    """Two masses of which the body rubs, by another integration."""
-    rubbing = Campaign("made", (*(rubbed(name, start) for name, start in RELEASED.items()),), (), "")
-    found = si.diagnose(model, rubbing)
-    assert found.verdict.kind in ("effect", "unknown")
-    assert found.verdict.ports == ("suspension",)
-
-
-def rubbed(name: str, start: tuple[float, ...], force: float = 60.0) -> Recording:
-    """A decay of two masses with a friction between them [N]."""
-    p = PARAMETERS.as_dict()
-
-    def rates(_: float, x: NDArray[np.float64]) -> list[float]:
-        deflection, speed = x[1] - x[0], x[3] - x[2]
-        strut = p["k"] * deflection + p["c"] * speed + force * np.tanh(speed / 1e-3)
-        return [x[2], x[3], strut / p["m_s"], -(strut + p["k_t"] * x[1] + p["c_t"] * x[3]) / p["m_u"]]
-
-    time = np.arange(round(5.0 * RATE)) / RATE
-    x = solve_ivp(
-        rates, (0.0, 5.0), start, t_eval=time, method="LSODA", rtol=1e-8, atol=1e-10, max_step=2e-3
-    ).y
-    accel = np.array([rates(0.0, each)[2] for each in x.T])
-    random = np.random.default_rng(len(name))
-    values = {
-        each: row + NOISE[each] * random.standard_normal(time.size)
-        for each, row in zip(READINGS, (accel, x[1] - x[0]), strict=True)
-    }
-    return recording_of(name, "decay", time, values)
 
 
 def test_an_input_that_was_not_recorded_in_a_decay_rests() -> None:
