@@ -32,7 +32,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, parse_rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import measured_response
+from savgs_ident.simulate.compared_tests import measured_response
 from savgs_ident.validation.blind_answer import Answer, Seal, envelope_of, opened
 from savgs_ident.validation.blind_marks import score_of
 from savgs_ident.validation.blind_score import Score

@@ -288,7 +288,7 @@ def _blocked_for_new_processes() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    # FreeInitialStates by the first process, it would end the blocking before that one has inherited it.
+    # Begun by the first process, it would end the blocking before that one has inherited it.
     resource_tracker.ensure_running()
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -43,7 +43,7 @@ from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.inference.observations import Data, Prediction, Term
-from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse

@@ -167,4 +167,6 @@ def predict_left_out(
     steep = steep - own.explained_by_nuisances(steep)
     predicted = data.measured[out] - miss
     variance = variance + np.einsum("ij,jk,ik->i", steep, covariance, steep)
-    return predicted, -0.5 * (miss**2 / variance + np.log(variance / data.variance[out]))
+    # The normal density of as many numbers as nuisances leave.
+    width = own.left_by_nuisances * np.log(variance / data.variance[out])
+    return predicted, -0.5 * (miss**2 / variance + width)

@@ -28,7 +28,7 @@ from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, 
 from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.initial_states import compared_response, settle_initial_states
+from savgs_ident.inference.initial_states import compared_motion, settle_initial_states
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.inference.problem import ProblemSettings
@@ -39,8 +39,8 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.simulate.driven_plant import motion_in, motion_of, origin_along, sized_along
-from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep
+from savgs_ident.simulate.compared_tests import Measurements, campaign_of, first_sweep
+from savgs_ident.simulate.driven_plant import held_against, motion_of, origin_along, sized_along
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -197,18 +197,17 @@ def ask(
     progress: Progress = no_progress,
 ) -> Asked:
     """What :func:`diagnose` holds a model against: a response, or the force of a drive; raises as it does."""
-    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
-    measured = measured if motion is None else motion
+    measured = held_against(measured, model)
     if isinstance(measured, DrivenMotion):
         sized = sized_along(model, measured)
         settings, values = _asked(sized, 0, without, constants)
         return AskedMotion(measured, sized.before, settings, values)
-    response = compared_response(measured, model, orders, max_frequency, progress)
+    response, _ = compared_motion(measured, model, orders, max_frequency, progress)
     model, resized = sized_to(model, response)
     given, settings, values = baseline_of(model, orders, without, constants)
     if response.initial_states is not None:
         options = ProblemSettings(orders=orders)
-        response, _ = settle_initial_states(response, given, tuple(settings.free), options, progress)
+        response, _ = settle_initial_states(response, given, tuple(settings.free), options, progress, values)
     return AskedDwells(response, given, settings, values, (*response.warnings, *resized))
 
 

@@ -109,7 +109,8 @@ def find_regimes(
     there are none, a drift is looked for in all of them. The time is that of ``cycles.recorded``. ``steady``
     are the data less the drifts that they tolerate, where they do.
     """
-    residual = (data.measured - fit.prediction.rows)[None]
+    missed = data.measured - fit.prediction.rows
+    residual = (missed - data.explained_by_nuisances(missed))[None]
     drawn, noise = drawn_residuals(data, fit, draws, constants=constants), drawn_noise(data)
     waves = cycles.waves(np.concatenate([residual, *drawn]))
     floor = np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
@@ -123,9 +124,10 @@ def find_regimes(
         without = drawn_residuals(data, fit, draws, source=steady, constants=constants)
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
     rows = np.concatenate([residual, *without, noise])
+    slopes = fit.slopes - data.explained_by_nuisances(fit.slopes)
     drifts = _drifts(cycles, constants.same_regime_share)
     for name, over in drifts.items() if data.tests >= constants.fewest_trend_tests else ():
-        trend = _trend(data, fit, rows, fit.slopes[:, columns], over)
+        trend = _trend(data, fit, rows, slopes[:, columns], over)
         if trend is None:
             continue
         some = len(rows) - len(noise)
@@ -155,13 +157,15 @@ def drawn_residuals(
     random, noise = np.random.default_rng(seed), fit.noise_scales.noise
     discrepancy = _small_discrepancy(data, fit, constants)
     weighted = data.turned(fit.slopes) / fit.noise_scales.spread[:, None]
+    slopes = fit.slopes - data.explained_by_nuisances(fit.slopes)
     shares = source.shared is not None or source.tolerated is not None
     found = []
     for each in (source, replace(source, shared=None, tolerated=None))[: 2 if shares else 1]:
         errors = np.stack([each.draw_errors(noise, discrepancy, random) for _ in range(draws)], axis=1)
         errors += fit.slopes @ random.standard_normal((fit.slopes.shape[1], draws))
+        errors -= data.explained_by_nuisances(errors)
         taken_up = np.linalg.solve(fit.precision, weighted.T @ data.turned(errors))
-        found.append(np.asarray((errors - fit.slopes @ taken_up).T))
+        found.append(np.asarray((errors - slopes @ taken_up).T))
     return tuple(found)
 
 
@@ -173,7 +177,8 @@ def _small_discrepancy(data: Data, fit: LaplaceFit, constants: DecisionConstants
 def drawn_noise(data: Data) -> Array:
     """The noise of the rows alone (S, m) [unit of each row], at the scale that was measured."""
     random = np.random.default_rng(SEED)
-    return np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
+    noise = np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
+    return noise - data.explained_by_nuisances(noise.T).T
 
 
 def _spread(cycles: Cycles, data: Data, fit: LaplaceFit, floor: Array, constants: DecisionConstants) -> Array:

@@ -23,7 +23,8 @@ from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import comparable, gaps
 from savgs_ident.inference.laplace import spread_of
-from savgs_ident.inference.problem import HarmonicTarget, Pins, Problem, Task
+from savgs_ident.inference.problem import Pins, Problem, Task
+from savgs_ident.inference.targets import HarmonicTarget
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.readings import harmonics

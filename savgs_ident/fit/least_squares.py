@@ -37,15 +37,8 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
-from savgs_ident.inference.problem import (
-    HarmonicTarget,
-    Problem,
-    ProblemSettings,
-    Quantity,
-    Target,
-    Task,
-    plan_task,
-)
+from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
+from savgs_ident.inference.targets import HarmonicTarget, Target
 from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -124,7 +117,7 @@ def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
         orders=min(problem.orders, task.settings.orders) if task.measured.dwells.size else problem.orders,
         used=np.array(problem.target.used),
         predicted=_read(problem.target, harmonics(problem.model, p, best.solution, problem.orders)),
-        frictionless=frictionless,
+        frictionless=_read(problem.target, frictionless),
         frictionless_status=frictionless_status,
         as_given=_read(problem.target, outcome.as_given),
         starts=tuple((each.cost, each.status) for each in outcome.tried),

@@ -3,7 +3,7 @@
 A comparison shows a model with its effects and without, at the measured dwells and between them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
@@ -18,9 +18,9 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.along_motion import MotionComparison, MotionFit, compare_along_motion, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
-from savgs_ident.inference.initial_states import compared_motion, compared_response, settle_initial_states
+from savgs_ident.inference.initial_states import compared_motion, settle_initial_states
 from savgs_ident.inference.port_sizes import sized_to
-from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
@@ -29,13 +29,9 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
-from savgs_ident.simulate.driven_plant import motion_in, motion_of, origin_along
-from savgs_ident.simulate.excitation import (
-    Measurements,
-    campaign_of,
-    measured_excitation,
-    response_of_tests,
-)
+from savgs_ident.simulate.compared_tests import Measurements, campaign_of, response_of_tests
+from savgs_ident.simulate.driven_plant import held_against, motion_of, origin_along
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -81,8 +77,7 @@ def fit(
     parameters.
     """
     use_persistent_cache()
-    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
-    measured = measured if motion is None else motion
+    measured = held_against(measured, model)
     if isinstance(measured, DrivenMotion):
         if peak_to_peak or max_frequency is not None:
             raise InputError(
@@ -143,27 +138,35 @@ def fit_with(
     else:
         response, motion = compared_motion(measured, drawing, settings.orders, max_frequency, progress)
     drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
-    warnings = (*response.warnings, *resized)
-    origin = model.origin(campaign_of(measured), warnings).with_command(command)
     # Beside other programs threads of the linear algebra wait for each other: its largest matrices take thirty times
     # as long, and on cores that are free they gain a tenth of a second.
     with threadpool_limits(1, "blas"):
-        values, begin = {} if model.is_drawing else model.identified[1], None
+        values, begin = {} if model.is_drawing else _within_bounds(model.identified[1], drawing), None
         if response.initial_states is not None:
             response, begin = settle_initial_states(
                 response, drawing, names, settings.problem, progress, values
             )
+        warnings = (*response.warnings, *resized)
         return fit_least_squares(
             response,
             drawing,
             free=names,
             settings=settings,
-            origin=origin,
+            origin=model.origin(campaign_of(measured), warnings).with_command(command),
             motion=motion,
             values=values,
             begin=begin,
             progress=progress,
         )
+
+
+def _within_bounds(values: Mapping[str, float], model: Model) -> dict[str, float]:
+    """Values [SI] that were identified from other data, by name, as near as the bounds of a model come to them."""
+    table = model.table
+    return {
+        name: min(max(value, table[name].lower), table[name].upper) if name in table else value
+        for name, value in values.items()
+    }
 
 
 def _with_peaks(
@@ -268,12 +271,11 @@ def compare(
     that cannot be used.
     """
     use_persistent_cache()
-    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
-    measured = measured if motion is None else motion
+    measured = held_against(measured, model)
     if isinstance(measured, DrivenMotion):
         progress("finding the force that the model needs")
         return compare_along_motion(model, measured, origin_along(model, measured))
-    response = compared_response(measured, model.before, orders, None, progress, identified=model)
+    response, _ = compared_motion(measured, model.before, orders, None, progress, identified=model)
     excitation = measured_excitation(model.plant, response, model.table)
     names = [each.name for each in model.channels]
     places = [response.channel(name) for name in names if name in response.channels]

@@ -26,7 +26,7 @@ from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.harmonic_question import PosedHarmonics, Question
-from savgs_ident.inference.initial_states import compared_response
+from savgs_ident.inference.initial_states import compared_motion
 from savgs_ident.inference.motion_question import MotionQuestion, PosedMotion
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task
@@ -34,11 +34,10 @@ from savgs_ident.inference.result import HarmonicPosterior, Marginal, MotionPost
 from savgs_ident.inference.sample import sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
-from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.driven_plant import motion_in, origin_along, sized_along
-from savgs_ident.simulate.excitation import Measurements, campaign_of
+from savgs_ident.simulate.compared_tests import Measurements, campaign_of
+from savgs_ident.simulate.driven_plant import held_against, origin_along, sized_along
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -130,12 +129,11 @@ def _motion(
     identified: Fit | MotionFit | Model, measured: Measurements | DrivenMotion | None
 ) -> DrivenMotion | None:
     """The motion along which the model is held against the force of its drive; None where it is not."""
-    if isinstance(measured, DrivenMotion):
-        return measured
     if measured is None:
         return identified.motion if isinstance(identified, MotionFit) else None
     model = identified.model if isinstance(identified, (Fit, MotionFit)) else identified
-    return motion_in(measured, model) if isinstance(measured, Campaign) else None
+    found = held_against(measured, model)
+    return found if isinstance(found, DrivenMotion) else None
 
 
 def _origin(identified: Fit | Model, measured: Measurements | None, response: HarmonicResponse) -> Origin:
@@ -167,7 +165,10 @@ def _measured(
 ) -> HarmonicResponse:
     if measured is not None:
         model = identified.model if isinstance(identified, Fit) else identified
-        return compared_response(measured, model.before, orders, max_frequency, progress, identified=model)
+        response, _ = compared_motion(
+            measured, model.before, orders, max_frequency, progress, identified=model
+        )
+        return response
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")

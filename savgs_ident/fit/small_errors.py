@@ -35,7 +35,8 @@ from savgs_ident.inference.posterior_mode import (
     with_background,
 )
 from savgs_ident.inference.prior import Prior
-from savgs_ident.inference.problem import HarmonicTarget, Task
+from savgs_ident.inference.problem import Task
+from savgs_ident.inference.targets import HarmonicTarget
 
 Matrix = NDArray[np.float64]
 

@@ -16,9 +16,10 @@ from savgs_ident.inference.harmonic_model import ExactHarmonics, SampledHarmonic
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.posterior_mode import PosteriorDensity, PosteriorMode, find_mode
 from savgs_ident.inference.prior import Prior
-from savgs_ident.inference.problem import ProblemSettings, Task, harmonic_target, plan_task
+from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
 from savgs_ident.inference.result import HarmonicPosterior, Predictive
 from savgs_ident.inference.samplers.chains import Chains, SamplingSettings
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import simulate_periodic
@@ -37,10 +38,11 @@ def predict(exact: ExactHarmonics, chains: Chains, count: int, seed: int) -> Pre
     spread = np.asarray(jax.vmap(likelihood.spread)(jnp.asarray(points)))
     errors = np.random.default_rng(seed).standard_normal(spread.shape) * np.sqrt(spread)
     rows = np.stack([likelihood.rows_of_one(each) for each in model])
-    replicated = likelihood.harmonics(rows + errors, shape)
+    read, replicated = (likelihood.harmonics(each, shape) for each in (rows, rows + errors))
     measured = likelihood.harmonics(np.asarray(likelihood.measured)[None], shape)[0]
     used = np.asarray(exact.problem.target.used)
-    return Predictive(model, np.where(used, replicated, 0.0), used, _inside(measured, replicated, used))
+    inside = _inside(measured, replicated, used)
+    return Predictive(np.where(used, read, model), np.where(used, replicated, 0.0), used, inside)
 
 
 def _inside(

@@ -3,7 +3,7 @@
 They are found by least squares, with the parameters of a model as they are or along with those that are to be
 identified: how high a decay begins and how fast it dies away are of a kind, and where the parameters are off, so are
 the initial states. From there on they are nuisances: what others would change, to first order, says nothing about a
-model (:class:`savgs_ident.inference.problem.HarmonicTarget`).
+model (:class:`savgs_ident.inference.targets.HarmonicTarget`).
 
 States that slide, as the anchor of a contact that sticks, begin where nothing stretches them: the first slip makes
 them forget it.
@@ -12,7 +12,7 @@ them forget it.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -24,18 +24,13 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.inference.problem import (
-    HarmonicTarget,
-    ProblemSettings,
-    evaluate,
-    harmonic_target,
-    plan_task,
-    whitened,
-)
+from savgs_ident.inference.problem import ProblemSettings, evaluate, plan_task
+from savgs_ident.inference.targets import HarmonicTarget, harmonic_target, whitened
 from savgs_ident.plants.base import AbstractPlant, state_sizes
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, InitialStates
-from savgs_ident.simulate.excitation import Measurements, measured_excitation
+from savgs_ident.simulate.compared_tests import Measurements
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.forgetting import forgetful_motion
 from savgs_ident.simulate.periodic import PeriodicSolution, resolve, simulate_periodic, with_initial_states
 from savgs_ident.simulate.readings import harmonics
@@ -48,6 +43,9 @@ EVALUATIONS = 80
 
 SETTLED = 1e-4
 """Share of the sum of squares by which a step has to lower it to be worth it."""
+
+LEAST_STEP = 1e-6
+"""Steps of a search that are shorter than this share of where it is lead nowhere: it has ended."""
 
 BEGIN = 0.5
 """The states with which the search begins, in their typical sizes."""
@@ -76,11 +74,6 @@ def compared_motion(
     if response.part is None or not response.part.begins_moving.any():
         return response, motion
     return estimate_initial_states(response, identified or model, orders, progress), None
-
-
-def compared_response(*args: Any, **options: Any) -> HarmonicResponse:
-    """The response of :func:`compared_motion` alone."""
-    return compared_motion(*args, **options)[0]
 
 
 def estimate_initial_states(
@@ -112,14 +105,16 @@ def estimate_initial_states(
 
 
 def _with_known(response: HarmonicResponse, known: InitialStates, ended: bool) -> HarmonicResponse:
-    if ended:
-        return replace(response, initial_states=known)
-    warning = DataWarning(
-        "initial_state_not_found",
-        "the search for the states with which tests begin did not end",
-        remedy="begin with better parameters, or let tests begin at rest",
-    )
-    return replace(response, initial_states=known, warnings=(*response.warnings, warning))
+    code = "initial_state_not_found"
+    warnings = tuple(each for each in response.warnings if each.code != code)
+    if not ended:
+        warning = DataWarning(
+            code,
+            "the search for the states with which tests begin did not end",
+            remedy="begin with better parameters, or let tests begin at rest",
+        )
+        warnings = (*warnings, warning)
+    return replace(response, initial_states=known, warnings=warnings)
 
 
 def _estimated(
@@ -292,8 +287,10 @@ class FreeInitialStates:
 
     def _changes(self, model: AbstractPlant, p: Values, solution: PeriodicSolution) -> NDArray[np.complex128]:
         sizes = _sizes(model)
-        changes = np.asarray(changes_by_initial_states(model, p, solution, self.orders, sizes.size))
-        return np.asarray(changes * sizes, np.complex128)
+        found = np.asarray(changes_by_initial_states(model, p, solution, self.orders, sizes.size))
+        changes = np.zeros(found.shape, np.complex128)
+        changes[self.moving] = found[self.moving] * sizes
+        return changes
 
 
 def _sizes(model: AbstractPlant) -> Array:
@@ -321,11 +318,11 @@ def _lowest(
 
     last = at(z, solution)
     if not (last.solved and np.isfinite(last.residual).all()):
-        return z, last, True
-    tried = dict[bytes, _Point]()
+        return z, last, False
+    tried = {z.tobytes(): last}
 
     def residual(z: Array) -> Array:
-        found = at(z, last.solution)
+        found = tried.get(z.tobytes()) or at(z, last.solution)
         tried[z.tobytes()] = found
         fine = found.solved and bool(np.isfinite(found.residual).all())
         return found.residual if fine else np.full(found.residual.shape, np.inf)
@@ -337,5 +334,5 @@ def _lowest(
         return last.find_slopes()
 
     # Without a scale of its own the first step is of a typical size.
-    found = least_squares(residual, z, slopes, ftol=SETTLED, xtol=None, gtol=None, max_nfev=EVALUATIONS)
+    found = least_squares(residual, z, slopes, ftol=SETTLED, xtol=LEAST_STEP, gtol=None, max_nfev=EVALUATIONS)
     return found.x, last, found.status > 0

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import NUISANCE, Scales
-from savgs_ident.inference.problem import HarmonicTarget
+from savgs_ident.inference.targets import HarmonicTarget
 
 
 class RowLikelihood(eqx.Module):

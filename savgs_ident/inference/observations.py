@@ -22,7 +22,8 @@ DEPENDENT = 1e-9
 
 def spanned(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Columns of length one, perpendicular to each other, that span the same as columns (m, n) of any units."""
-    along, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    lengths = np.linalg.norm(columns, axis=0)
+    along, sizes, _ = np.linalg.svd(columns / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False)
     return along[:, sizes > DEPENDENT * sizes.max(initial=0.0)]
 
 
@@ -148,8 +149,8 @@ class Data:
         shared: B, by how much it moves them together, (m, k); None where they share nothing.
         tolerated: errors of known size that they share, (m, t): what is known of the model to a tolerance, but is no
             number of its own. Their scale is that of the noise. None where there are none.
-        nuisance: directions in which they say nothing, (m, s): what other initial states of tests would change. None
-            where there are none. There are so many independent numbers less.
+        nuisance: directions in which they say nothing, (m, s): what other initial states of tests and offsets of
+            sensors would change. None where there are none. There are so many independent numbers less.
     """
 
     measured: NDArray[np.float64]
@@ -238,6 +239,14 @@ class Data:
         whitened = self.nuisance * weight[:, None]
         sizes = np.linalg.lstsq(whitened, (missed.T * weight).T)[0]
         return np.asarray(self.nuisance @ sizes)
+
+    @cached_property
+    def left_by_nuisances(self) -> NDArray[np.float64]:
+        """The share of the noise's variance of each number that nuisances leave [1], (m,): m - s in all."""
+        if self.nuisance is None:
+            return np.ones(self.variance.size)
+        basis = spanned(self.nuisance / np.sqrt(self.variance)[:, None])
+        return np.asarray(1.0 - np.sum(basis**2, axis=1))
 
     @property
     def _share(self) -> bool:

@@ -20,7 +20,7 @@ from savgs_ident.effects.base import Load, Port, PortKind, PortSignals
 from savgs_ident.inference.background.imposed import impose, node_loads
 from savgs_ident.inference.background.port_functions import mesh_points, rate_of
 from savgs_ident.inference.likelihood import likelihood_of
-from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.responses.harmonic_response import HarmonicResponse

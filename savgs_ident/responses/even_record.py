@@ -160,21 +160,31 @@ _Samples = tuple[Array, Array]
 
 
 def is_decay(recording: Recording, inputs: Sequence[str]) -> bool:
-    """Whether nothing drives the plant in a test that is called a decay: a recorded input shows noise at its end."""
-    return recording.kind == "decay" and not any(
-        np.std(later) > max(_MOVES * roughness(later), _SAME * np.max(np.abs(later)))
-        for name in inputs
-        if (each := _usable(recording, name)) is not None and (later := each[1][each[1].size // 2 :]).size
-    )
+    """Whether nothing drives the plant in a test that is called a decay.
+
+    A recorded input shows noise at its end, or a straight line, as a load cell that drifts.
+    """
+    if recording.kind != "decay":
+        return False
+    known = [each for name in inputs if (each := _usable(recording, name)) is not None]
+    return not any(_moves(values[values.size // 2 :]) for _, values in known)
+
+
+def _moves(values: Array) -> bool:
+    """Whether evenly taken values (n,) show more than noise about a straight line."""
+    place = np.linspace(-1.0, 1.0, values.size)
+    about_line = values - place * (place @ values) / (place @ place)
+    return bool(np.std(about_line) > max(_MOVES * roughness(values), _SAME * np.max(np.abs(values))))
 
 
 def _usable(recording: Recording, name: str) -> _Samples | None:
     """The samples of a channel that are numbers, each instant once; None where there are next to none."""
     channel = recording.channels.get(name)
-    if channel is None or np.count_nonzero(known := np.isfinite(channel.values)) < _FEWEST:
+    if channel is None:
         return None
+    known = np.isfinite(channel.values)
     time, first = np.unique(channel.time[known], return_index=True)
-    return time, channel.values[known][first]
+    return None if time.size < _FEWEST else (time, channel.values[known][first])
 
 
 def _unfit(usable: Mapping[str, _Samples], highest_hz: float) -> tuple[str, str, str]:

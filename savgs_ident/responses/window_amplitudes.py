@@ -127,7 +127,7 @@ class Windows:
                 picked = amplitudes[::step][: kept.size]
                 harmonics[w, c, : picked.size] = picked
                 covariance[w, c] = noise[w, c] ** 2 * variance * np.eye(2)
-                alone = np.arange(kept.size) % self._apart(window) == 0 if name not in inputs else kept
+                alone = np.arange(kept.size) % self._apart(window, every) == 0 if name not in inputs else kept
                 valid[w, c, : kept.size] = kept & alone & (not self._has_gap(window, name))
         return HarmonicResponse(
             tests=tuple(self._name(each) for each in self.windows),
@@ -188,9 +188,12 @@ class Windows:
         every = max(2, ceil(2 * len(self.windows) * readings * last / NUMBERS))
         return every, every * np.arange(last // every + 1) >= LOWEST_HZ / self.time_scale * self.length
 
-    def _apart(self, window: _Window) -> int:
-        """Every so many-th of the numbers of a window counts: those of a short part share their noise with more."""
-        return max(1, round(max(each.compared for each in self.windows) / window.compared))
+    def _apart(self, window: _Window, every: int) -> int:
+        """Every so many-th of the numbers of a window, ``every`` orders apart, counts.
+
+        Amplitudes nearer to each other than two periods of what is compared share their noise.
+        """
+        return max(1, round(2.0 * max(each.compared for each in self.windows) / (every * window.compared)))
 
     def _signal(self, window: _Window, name: str, led_over: bool) -> tuple[Array, Array]:
         """A channel at the instants of a window [its unit], and the share with which each counts [1], (n,) both.

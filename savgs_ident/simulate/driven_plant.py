@@ -23,6 +23,7 @@ from savgs_ident.responses.driven_motion import DrivenMotion, joined
 from savgs_ident.responses.even_record import is_decay
 from savgs_ident.responses.recorded_motion import recorded_motion, recorded_speed
 from savgs_ident.simulate.along_motion import Samples, force_gain
+from savgs_ident.simulate.compared_tests import Measurements
 
 FORCE_SHARE = 0.35
 """Share of the drive's force that a law at a port typically has where it matters. Origin: by choice, about that of
@@ -42,7 +43,7 @@ def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
     return plant.inputs[0].unit not in MOTIONS
 
 
-def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
+def _is_held_against_drive(campaign: Campaign, model: Model) -> bool:
     """Whether a model is held against the force of its drive along the motions of a campaign.
 
     Not where there are dwells, whose response it predicts, or decays, which no drive drives.
@@ -52,12 +53,14 @@ def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
     return is_driven(model.plant) and not predicted and bool(_reading(model.plant))
 
 
-def motion_in(campaign: Campaign, model: Model) -> DrivenMotion | None:
-    """The motions along which a model is held against its drive; None where that is not how it is held.
+def held_against(measured: Measurements | DrivenMotion, model: Model) -> Measurements | DrivenMotion:
+    """What a model is held against: the motions of a campaign where it is held against its drive, else all as given.
 
     Raises :class:`InputError` as :func:`motion_of` does.
     """
-    return motion_of(campaign, model) if is_held_against_drive(campaign, model) else None
+    if isinstance(measured, Campaign) and _is_held_against_drive(measured, model):
+        return motion_of(measured, model)
+    return measured
 
 
 def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:

@@ -16,7 +16,8 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
 from savgs_ident.responses.windows import LEAD_S, estimate_whole_tests, estimate_windows
-from savgs_ident.simulate.excitation import Measurements, measured_excitation, response_of_tests
+from savgs_ident.simulate.compared_tests import Measurements, response_of_tests
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 REMEMBERED = 0.01

@@ -27,12 +27,12 @@ from savgs_ident.plants.profiles import Constant, LinearSweep, Offset, ProfileSo
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
+from savgs_ident.simulate.compared_tests import recorded_names
 from savgs_ident.simulate.curves import ModelCurve, model_curve, programmes_of
 from savgs_ident.simulate.excitation import (
     interpolate_excitation,
     measured_excitation,
     only_driven,
-    recorded_names,
     resting_values,
     sine_excitation,
     typical_amplitude,

@@ -32,7 +32,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
-from savgs_ident.simulate.excitation import first_sweep, measured_response
+from savgs_ident.simulate.compared_tests import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.validation.blind_answer import Answer, Envelope, Seal, envelope_of, opened, sealed
 from savgs_ident.validation.blind_draw import Shares, draw_answer

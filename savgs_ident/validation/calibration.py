@@ -40,13 +40,14 @@ from savgs_ident.inference.posterior_mode import (
     with_background,
 )
 from savgs_ident.inference.prior import Prior
-from savgs_ident.inference.problem import Task, harmonic_target
+from savgs_ident.inference.problem import Task
 from savgs_ident.inference.result import Sampler
 from savgs_ident.inference.sample import SAMPLERS
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.excitation import every_so_many, measured_response
+from savgs_ident.simulate.compared_tests import every_so_many, measured_response
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.readings import harmonics

@@ -7,7 +7,7 @@ import numpy as np
 
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
-from savgs_ident.simulate.excitation import first_sweep
+from savgs_ident.simulate.compared_tests import first_sweep
 
 
 def test_the_first_sweep_that_can_be_used_is_taken(nominal_campaign: Path) -> None:

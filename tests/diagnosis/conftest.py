@@ -19,7 +19,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import recorded_names
+from savgs_ident.simulate.compared_tests import recorded_names
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution
 
 from ..fit.bench import only

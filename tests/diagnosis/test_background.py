@@ -25,7 +25,7 @@ from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
-from savgs_ident.simulate.excitation import measured_response
+from savgs_ident.simulate.compared_tests import measured_response
 
 from ..fit.bench import only
 from .conftest import DWELLS

@@ -12,7 +12,7 @@ from savgs_ident.inference.background.locations import _analysed, _readings, inp
 from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
-from savgs_ident.simulate.excitation import response_of_tests
+from savgs_ident.simulate.compared_tests import response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
 from tests.simulate.linear_roads import dwells_and_road

@@ -8,7 +8,7 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.effects.effect import generic_effects
 from savgs_ident.inference.background.port_functions import mesh_points, resonance
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
-from savgs_ident.simulate.excitation import response_of_tests
+from savgs_ident.simulate.compared_tests import response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution
 from tests.simulate.linear_roads import dwells_and_road
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.inference.problem import Target, harmonic_target, peak_to_peak_target
+from savgs_ident.inference.targets import Target, harmonic_target, peak_to_peak_target
 from savgs_ident.plants.quarter_car.plant import CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 

@@ -12,16 +12,18 @@ from scipy.linalg import expm
 import savgs_ident as si
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
-from savgs_ident.inference.initial_states import FreeInitialStates, compared_response, settle_initial_states
-from savgs_ident.inference.observations import Data
-from savgs_ident.inference.problem import ProblemSettings, harmonic_target, whitened
+from savgs_ident.inference.initial_states import FreeInitialStates, compared_motion, settle_initial_states
+from savgs_ident.inference.observations import Data, spanned
+from savgs_ident.inference.problem import ProblemSettings
+from savgs_ident.inference.targets import harmonic_target, whitened
 from savgs_ident.plants.base import state_sizes
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.recordings.recording import Campaign, Recording, classify_test
 from savgs_ident.responses.even_record import is_decay
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.windows import estimate_windows
-from savgs_ident.simulate.excitation import measured_excitation, response_of_tests
+from savgs_ident.simulate.compared_tests import response_of_tests
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import changes_by_initial_states
@@ -79,7 +81,7 @@ def model() -> si.PlantModel:
 
 @pytest.fixture(scope="module")
 def as_it_is(model: si.PlantModel) -> HarmonicResponse:
-    return compared_response(decays(), model, 9)
+    return compared_motion(decays(), model, 9)[0]
 
 
 def test_states_with_which_decays_begin_are_found(as_it_is: HarmonicResponse) -> None:
@@ -147,7 +149,7 @@ def test_a_fit_to_decays_finds_the_parameters(model: si.PlantModel) -> None:
 
 
 def test_parameters_and_initial_states_are_settled_together(model: si.PlantModel) -> None:
-    given = compared_response(decays(**TRUTH), model, 9)
+    given, _ = compared_motion(decays(**TRUTH), model, 9)
     settled = settle_initial_states(given, model, ("k", "c"), ProblemSettings())
     assert settled.response.initial_states is not None
     assert given.initial_states is not None
@@ -160,7 +162,7 @@ def test_parameters_and_initial_states_are_settled_together(model: si.PlantModel
 
 def test_a_decay_begins_where_the_rig_is_let_go(model: si.PlantModel) -> None:
     held = decay("release_up", RELEASED["release_up"], 4.0, held=1.5)
-    found = compared_response(Campaign("made", (held,), (), ""), model, 9)
+    found, _ = compared_motion(Campaign("made", (held,), (), ""), model, 9)
     assert found.initial_states is not None
     np.testing.assert_allclose(
         found.initial_states.states[0, :2], RELEASED["release_up"][:2], rtol=0.1, atol=3e-4
@@ -195,7 +197,7 @@ def test_of_a_plant_that_forgets_nothing_tests_may_begin_moving() -> None:
     values = dict(zip(READINGS, linear_readings(time, plate, c=40.0, c_t=0.0), strict=True))
     values = {name: each[kept] for name, each in ({"road_height": plate} | values).items()}
     made = Campaign("made", (recording_of("road_a", "road", time[kept] - time[3000], values),), (), "")
-    found = compared_response(made, ringing, 9)
+    found, _ = compared_motion(made, ringing, 9)
     assert found.tests == ("road_a, 0.0 to 8.0 s",)
     plant, p = ringing.build(), as_values(ringing.table.as_dict())
     excitation = measured_excitation(plant, found, ringing.table)
@@ -209,9 +211,7 @@ def test_of_a_plant_that_forgets_nothing_tests_may_begin_moving() -> None:
 
 def test_a_decay_in_which_nothing_moves_is_refused(model: si.PlantModel) -> None:
     with pytest.raises(InputError):
-        compared_response(
-            Campaign("made", (decay("release_up", (0.0, 0.0, 0.0, 0.0), 0.2),), (), ""), model, 9
-        )
+        compared_motion(Campaign("made", (decay("release_up", (0.0, 0.0, 0.0, 0.0), 0.2),), (), ""), model, 9)
 
 
 def test_a_model_is_compared_from_where_its_own_values_say_that_tests_begin(model: si.PlantModel) -> None:
@@ -295,6 +295,41 @@ def test_numbers_of_a_short_test_beside_a_long_one_have_noise_of_their_own() -> 
     assert np.max(np.abs(correlation)) < 0.35
 
 
+def test_a_short_test_beside_a_long_one_keeps_its_numbers() -> None:
+    """Orders that are compared are far apart where a test is long: those of a short one need no more distance."""
+    road, _ = campaign(seconds=60.0).recordings
+    seconds, time = 2.0, np.arange(round(2.0 * RATE)) / RATE
+    values = dict.fromkeys(READINGS, np.random.default_rng(3).standard_normal(time.size))
+    tests = (road, recording_of("release_short", "decay", time, values))
+    found = estimate_windows(Campaign("made", tests, (), ""), INPUTS, READINGS, highest_hz=15.0)
+    (short,) = (place for place, test in enumerate(found.tests) if test.startswith("release_short"))
+    kept = found.valid[short, [found.channel(name) for name in READINGS]].sum(axis=1)
+    # Two periods of what is compared lie between neighbours.
+    assert np.all(kept > 0.6 * 15.0 * seconds / 2.0)
+
+
+def test_a_motion_that_was_not_found_leaves_other_tests_alone(as_it_is: HarmonicResponse) -> None:
+    target = harmonic_target(as_it_is, TwoMass.channels, 9)
+    assert target.nuisance is not None
+    predicted = np.asarray(target.measured) + 1e-3
+    lost = predicted.copy()
+    lost[0] = np.nan
+    rows, with_lost = (
+        np.asarray(target(jnp.asarray(each))).reshape(len(predicted), -1) for each in (predicted, lost)
+    )
+    assert np.isnan(with_lost[0][target.used[0].repeat(2)]).all()
+    np.testing.assert_allclose(with_lost[1], rows[1], atol=1e-9)
+    np.testing.assert_allclose(
+        target.with_nuisances(lost)[1], target.with_nuisances(predicted)[1], atol=1e-12
+    )
+
+
+def test_what_columns_span_is_the_same_in_any_units() -> None:
+    columns = np.random.default_rng(5).standard_normal((12, 3))
+    assert spanned(columns * np.array([1e7, 1.0, 1e-7])).shape == (12, 3)
+    assert spanned(np.column_stack([columns, columns @ [1.0, 2.0, -1.0], np.zeros(12)])).shape == (12, 3)
+
+
 def test_so_many_numbers_are_independent_less() -> None:
     random = np.random.default_rng(4)
     nuisance, tolerated = random.standard_normal((30, 3)), random.standard_normal((30, 2))
@@ -313,6 +348,11 @@ def test_so_many_numbers_are_independent_less() -> None:
     np.testing.assert_allclose(turning @ noise @ turning.T, np.eye(27), atol=1e-10)
     made_up = nuisance @ np.array([1.0, -2.0, 0.5])
     np.testing.assert_allclose(data.explained_by_nuisances(made_up), made_up, atol=1e-10)
+    assert data.left_by_nuisances.sum() == pytest.approx(27.0)
+    noise_alone = replace(data, tolerated=None)
+    drawn = np.sqrt(data.variance)[:, None] * random.standard_normal((30, 20000))
+    left = np.var(drawn - noise_alone.explained_by_nuisances(drawn), axis=1) / data.variance
+    np.testing.assert_allclose(left, data.left_by_nuisances, atol=0.03)
 
 
 @pytest.mark.parametrize("name", ["decay_1", "Release up", "pluck-3", "ring_down", "free vibration 2"])

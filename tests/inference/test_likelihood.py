@@ -7,7 +7,7 @@ from scipy.stats import multivariate_normal
 
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.prior import Scales
-from savgs_ident.inference.problem import HarmonicTarget
+from savgs_ident.inference.targets import HarmonicTarget
 from savgs_ident.plants.quarter_car.plant import CHANNELS
 
 from ..in_one_test import over

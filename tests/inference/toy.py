@@ -16,7 +16,7 @@ from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.inference.harmonic_model import Responses
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.prior import Scales
-from savgs_ident.inference.problem import HarmonicTarget, harmonic_target
+from savgs_ident.inference.targets import HarmonicTarget, harmonic_target
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 

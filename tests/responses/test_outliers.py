@@ -20,7 +20,7 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import RobustDwell, WaveformSamples, check_outliers
 from savgs_ident.responses.summary import inspect
-from savgs_ident.simulate.excitation import campaign_of, measured_response
+from savgs_ident.simulate.compared_tests import campaign_of, measured_response
 
 from .corruption import drop, spike
 

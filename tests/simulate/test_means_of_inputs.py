@@ -13,7 +13,8 @@ from savgs_ident.plants.axis import Axis
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.windows import estimate_windows
-from savgs_ident.simulate.excitation import means_that_count, measured_excitation, measured_response
+from savgs_ident.simulate.compared_tests import measured_response
+from savgs_ident.simulate.excitation import means_that_count, measured_excitation
 from savgs_ident.validation.check_plant import check_plant
 
 RATE, HEIGHT = 200.0, 0.2

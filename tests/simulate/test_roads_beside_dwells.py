@@ -11,12 +11,13 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.public import compare
 from savgs_ident.inference.likelihood import likelihood_of
-from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.recordings.recording import Campaign, ChannelSpec, RecordedChannel, RecordingLayout
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import by_kind, only_tests
-from savgs_ident.simulate.excitation import measured_excitation, response_of_tests, up_to_frequency
+from savgs_ident.simulate.compared_tests import response_of_tests, up_to_frequency
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.readings import harmonics

@@ -16,7 +16,8 @@ from savgs_ident.plants.time_scale import natural_frequencies, time_scale_of
 from savgs_ident.plants.two_mass import GUIDE, PARAMETERS, SENSORS, TwoMass
 from savgs_ident.recordings.checks_signal import DataLocation, check_time
 from savgs_ident.recordings.recording import SLOWEST_HZ, Campaign, Recording
-from savgs_ident.simulate.excitation import measured_excitation, measured_response
+from savgs_ident.simulate.compared_tests import measured_response
+from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.forgetting import forgetful_motion
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.readings import harmonics
