@@ -14,7 +14,7 @@ for, come first, then those *tolerated* ones that are estimated along.
     ['mu_r = 0.03', 'k_t = 261250']
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import equinox as eqx
 import jax
@@ -73,6 +73,10 @@ class FreeVector(eqx.Module):
         pairs = zip(self._bijections(), inside, strict=True)
         return jnp.asarray([bijection.inverse(value) for bijection, value in pairs], float)
 
+    def coordinates(self, values: Float[Array, " n"]) -> Float[Array, " n"]:
+        """The vector [1] of ``values`` [SI unit of each], in the order of the names, strictly inside the bounds."""
+        return self._mapped(values, _inverse)
+
     def to_constrained(self, u: Float[Array, " n"]) -> dict[str, Float[Array, ""]]:
         """Name to SI value, strictly inside the bounds, at the vector ``u`` (n,) [1]."""
         return dict(zip(self.names, jnp.unstack(self._values(u)), strict=True))
@@ -100,16 +104,29 @@ class FreeVector(eqx.Module):
             for parameter in self.parameters[split:]
         ]
 
-    @eqx.filter_jit
     def _values(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
+        return self._mapped(u, _forward)
+
+    @eqx.filter_jit
+    def _mapped(
+        self, x: Float[Array, " n"], one: Callable[[AbstractBijection, Array], Array]
+    ) -> Float[Array, " n"]:
         # All maps of one kind in one operation: dozens of scalar ones would take a second to compile.
-        values = jnp.zeros_like(u)
+        mapped = jnp.zeros_like(x)
         bijections = self._bijections()
         for kind in dict.fromkeys(type(bijection) for bijection in bijections):
             places = [place for place, bijection in enumerate(bijections) if type(bijection) is kind]
             stacked = jax.tree.map(lambda *leaves: np.array(leaves), *(bijections[place] for place in places))
-            values = values.at[np.array(places)].set(stacked.forward(u[np.array(places)]))
-        return values
+            mapped = mapped.at[np.array(places)].set(one(stacked, x[np.array(places)]))
+        return mapped
+
+
+def _forward(bijection: AbstractBijection, u: Array) -> Array:
+    return bijection.forward(u)
+
+
+def _inverse(bijection: AbstractBijection, values: Array) -> Array:
+    return bijection.inverse(values)
 
 
 def known_to_tolerance(table: ParameterTable, identified: Sequence[str] = ()) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ rest, by their bounds.
 - :class:`Unbounded`: v = v0 + scale u.
 
     >>> friction = transform_of(Parameter("mu_r", 0.03, "1", lower=0.0, upper=0.5))
-    >>> round(friction.inverse(0.03), 12), bool(friction.forward(jnp.array(-50.0)) > 0.0)
+    >>> round(float(friction.inverse(0.03)), 12), bool(friction.forward(jnp.array(-50.0)) > 0.0)
     (0.0, True)
 
 The prior is normal on the coordinate, about 0 with the standard deviation of :func:`prior_width`: 1 where a tolerance
@@ -23,7 +23,7 @@ typical is known to an order of magnitude (:class:`OrdersOfMagnitude`).
 """
 
 from abc import abstractmethod
-from math import exp, inf, isfinite, log, sqrt
+from math import exp, inf, isfinite, log
 from typing import Any
 
 import equinox as eqx
@@ -59,8 +59,8 @@ _FAR = 1e12
 class AbstractBijection(eqx.Module):
     """A smooth, increasing map from an unconstrained coordinate to the open range of a parameter.
 
-    ``forward`` works element by element, on numbers and on arrays of NumPy or JAX: maps of one kind may be stacked,
-    each field an array (k,).
+    ``forward`` and ``inverse`` work element by element, on numbers and on arrays of NumPy or JAX: maps of one kind
+    may be stacked, each field an array (k,).
     """
 
     @abstractmethod
@@ -68,8 +68,8 @@ class AbstractBijection(eqx.Module):
         """The value [unit of the parameter] at the unconstrained coordinate ``u`` [1], a number or (k,)."""
 
     @abstractmethod
-    def inverse(self, value: float) -> float:
-        """The unconstrained coordinate [1] of a ``value`` strictly inside the range."""
+    def inverse(self, value: Any) -> Any:
+        """The unconstrained coordinate [1] of a ``value`` strictly inside the range, a number or (k,)."""
 
     @abstractmethod
     def slope(self, u: float) -> float:
@@ -96,15 +96,14 @@ class Tolerated(AbstractBijection):
         deviation = xp.where(u > high, towards_upper, xp.where(u < low, towards_lower, u))
         return self.nominal + self.tolerance * deviation
 
-    def inverse(self, value: float) -> float:
+    def inverse(self, value: Any) -> Any:
         """Standard deviations of ``value`` from the nominal one, unbent."""
+        xp = _array_module(value)
+        low, high = -0.5 * self.below, 0.5 * self.above
         deviation = (value - self.nominal) / self.tolerance
-        for sign, room in ((1.0, self.above), (-1.0, self.below)):
-            half = 0.5 * room
-            if sign * deviation > half:
-                share = sign * deviation / half - 1.0
-                return sign * half * (1.0 + share / sqrt(1.0 - share * share))
-        return deviation
+        above = high + high * _spread(xp.maximum(deviation / high - 1.0, 0.0))
+        below = low + low * _spread(xp.maximum(deviation / low - 1.0, 0.0))
+        return xp.where(deviation > high, above, xp.where(deviation < low, below, deviation))
 
     def slope(self, u: float) -> float:
         """d value / du, the tolerance up to half way to a bound."""
@@ -123,9 +122,9 @@ class OrdersOfMagnitude(AbstractBijection):
         """The value at ``u`` orders of magnitude."""
         return self.nominal * _array_module(u).exp(self.orders.forward(u))
 
-    def inverse(self, value: float) -> float:
+    def inverse(self, value: Any) -> Any:
         """Orders of magnitude of ``value`` from the typical one, unbent."""
-        return self.orders.inverse(log(value / self.nominal))
+        return self.orders.inverse(_array_module(value).log(value / self.nominal))
 
     def slope(self, u: float) -> float:
         """d value / du."""
@@ -146,9 +145,9 @@ class OneSided(AbstractBijection):
         """The value at log distance ``u``."""
         return self.bound + self.sign * self.scale * _array_module(u).exp(self.sign * u)
 
-    def inverse(self, value: float) -> float:
+    def inverse(self, value: Any) -> Any:
         """The log distance of ``value`` from the bound."""
-        return self.sign * log(self.sign * (value - self.bound) / self.scale)
+        return self.sign * _array_module(value).log(self.sign * (value - self.bound) / self.scale)
 
     def slope(self, u: float) -> float:
         """d value / du, the distance from the bound."""
@@ -175,7 +174,7 @@ class TwoSided(AbstractBijection):
         from_upper = self.upper - width * sigmoid(-shifted)
         return xp.where(shifted < 0.0, from_lower, from_upper)
 
-    def inverse(self, value: float) -> float:
+    def inverse(self, value: Any) -> Any:
         """The place of ``value`` on the curve."""
         return _logit(value, self.lower, self.upper) - self.offset
 
@@ -195,7 +194,7 @@ class Unbounded(AbstractBijection):
         """The value at ``u`` scales from the start."""
         return self.nominal + self.scale * u
 
-    def inverse(self, value: float) -> float:
+    def inverse(self, value: Any) -> Any:
         """The scales of ``value`` from the start."""
         return (value - self.nominal) / self.scale
 
@@ -313,5 +312,11 @@ def _saturate(x: Any) -> Any:
     return x / _array_module(x).sqrt(1.0 + x * x)
 
 
-def _logit(value: float, lower: float, upper: float) -> float:
-    return log(value - lower) - log(upper - value)
+def _spread(x: Any) -> Any:
+    """What :func:`_saturate` makes ``x``, which is below one, of."""
+    return x / _array_module(x).sqrt(1.0 - x * x)
+
+
+def _logit(value: Any, lower: float, upper: float) -> Any:
+    xp = _array_module(value)
+    return xp.log(value - lower) - xp.log(upper - value)

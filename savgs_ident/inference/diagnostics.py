@@ -212,9 +212,11 @@ class SurrogatePlant:
         surrogate, free = self.surrogate, self.surrogate.prior.free
         u = np.asarray(free.to_unconstrained(values))
         axes = np.asarray(surrogate.scale)[: u.size, : u.size]
-        v = np.linalg.solve(axes, u - np.asarray(surrogate.centre)[: u.size])
+        y = surrogate.straightened.coordinates(jnp.append(jnp.asarray(u), surrogate.centre[u.size :]))
+        v = np.linalg.solve(axes, np.asarray(y)[: u.size])
         rows, slopes = (np.asarray(each) for each in _rows_and_slopes(surrogate, jnp.asarray(v)))
-        by_value = np.linalg.solve(axes.T, slopes.T).T / np.asarray(free.jacobian_diag(jnp.asarray(u)))
+        by_free = np.linalg.solve(axes.T, slopes.T).T / np.asarray(surrogate.straightened.slopes(y))[: u.size]
+        by_value = by_free / np.asarray(free.jacobian_diag(jnp.asarray(u)))
         return Prediction(rows, lambda: by_value, Status.CONVERGED, None)
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: None) -> None:
@@ -350,7 +352,7 @@ def _rows_and_slopes(surrogate: Surrogate, v: Array) -> tuple[Array, Array]:
 
 @eqx.filter_jit
 def _hessian(surrogate: Surrogate, t: Array) -> Array:
-    return jax.hessian(surrogate)(t)
+    return jax.hessian(surrogate.of_point)(t)
 
 
 @eqx.filter_jit

@@ -1,12 +1,16 @@
 """The model near its posterior's mode: exactly, and as a cheap stand-in to second order.
 
 The exact model (:class:`ExactModel`) decides about every proposal of a sampler, the surrogate proposes. With v one
-standard deviation along the principal axes, u = centre + scale v, the rows of the likelihood are
+standard deviation along the principal axes of :class:`savgs_ident.inference.straightened.Straightened` coordinates,
+y = scale v, the rows of the likelihood are
 
     rows(v) = rows + slope v + 1/2 sum_ij v_i v_j bend_ij.
 
 The slopes are exact, the second derivatives their differences one standard deviation away; of these only the
-leading shapes of a singular value decomposition are kept.
+leading shapes of a singular value decomposition are kept. Along each axis that bends by itself the rows are exact
+further out, too: what the sum above leaves there is added, between points where the model was solved (see
+:class:`Curve`).
+A contact that is known to an order of magnitude does little beyond some stiffness, and no polynomial follows that.
 
 Where data identify a product of two parameters far better than either of them, the posterior is a thin banana,
 along which neither random steps nor trajectories get on. A triangular map straightens it:
@@ -33,6 +37,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import NUISANCE, Prior
+from savgs_ident.inference.straightened import Straightened
 
 
 class LinearRows(NamedTuple):
@@ -153,38 +158,91 @@ class Bend(NamedTuple):
     shape: Float[Array, "k m"]
 
 
+SPACING = 2.0
+"""Standard deviations from one point to the next at which rows along an axis are exact."""
+
+PLACES = np.array([-3, -2, -1, 1, 2, 3]) * SPACING
+"""These points. Origin: by choice; further out there are no draws."""
+
+
+class Curve(NamedTuple):
+    """What rows are along single axes beyond second order: v^2 times a curve through its values at the places.
+
+    Their ``share`` (n, 7, k), zero in the middle, times ``shape`` (k, m). Further out the outermost value holds.
+    """
+
+    share: Float[Array, "n 7 k"]
+    shape: Float[Array, "k m"]
+
+    def at(self, v: Float[Array, " n"]) -> Float[Array, " m"]:
+        """What it adds to the rows at ``v``."""
+        weights = jax.vmap(_weights)(v) * (v**2)[:, None]
+        return jnp.einsum("ip,ipk->k", weights, self.share) @ self.shape
+
+
+def _weights(v: Array) -> Array:
+    """Of the values at seven places, (7,), in a curve through them at v: cubic convolution, whose slope is smooth."""
+    last = PLACES[-1] / SPACING
+    # Beyond the outermost place stands its value again.
+    places = jnp.arange(-last - 1.0, last + 2.0)
+    off = jnp.abs(jnp.clip(v / SPACING, -last, last) - places)
+    near, far = (1.5 * off - 2.5) * off**2 + 1.0, ((-0.5 * off + 2.5) * off - 4.0) * off + 2.0
+    weights = jnp.where(off < 1.0, near, jnp.where(off < 2.0, far, 0.0))
+    return weights[1:-1].at[jnp.array([0, -1])].add(weights[jnp.array([0, -1])])
+
+
 class Surrogate(eqx.Module):
     """Log density over t (n + 2,); ``rows`` (m,) and ``slope`` (m, n) are the model's at v = 0.
 
-    t is in standard deviations, rows are in the unit of their reading.
+    t is in standard deviations, rows are in the unit of their reading. Axes ``scale`` are those of ``straightened``
+    coordinates.
     """
 
     likelihood: RowLikelihood
     prior: Prior
-    centre: Float[Array, " n+2"]
+    straightened: Straightened
     scale: Float[Array, "n+2 n+2"]
     rows: Float[Array, " m"]
     slope: Float[Array, "m n"]
     bend: Bend
+    curve: Curve
     map: TriangularMap
+
+    @property
+    def centre(self) -> Float[Array, " n+2"]:
+        """The point of the posterior [free coordinates, 1] at t = 0."""
+        return self.straightened.centre
 
     def point(self, t: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
         """The point of the posterior [free coordinates, 1] at ``t`` in standard deviations."""
-        return self.centre + self.scale @ self._straight(t)
+        return self.straightened.points(self.scale @ self._mapped(t))
+
+    def log_volume(self, t: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """Logarithm of the volume of points to that of ``t``, 0 in the centre."""
+        return jnp.sum(jnp.log(self.straightened.slopes(self.scale @ self._mapped(t))))
 
     def predicted(self, t: Float[Array, " n+2"]) -> Float[Array, " m"]:
-        """The rows of the likelihood [unit of the reading] at ``t``, to second order."""
-        return self.rows_at(self._straight(t)[: -len(NUISANCE)])
+        """The rows of the likelihood [unit of the reading] at ``t``."""
+        return self.rows_at(self._mapped(t)[: -len(NUISANCE)])
 
     def rows_at(self, v: Float[Array, " n"]) -> Float[Array, " m"]:
-        """The rows of the likelihood [unit of the reading] at ``v`` in standard deviations, to second order."""
+        """The rows of the likelihood [unit of the reading] at ``v`` in standard deviations."""
         products = v[self.bend.first] * v[self.bend.second]
-        return self.rows + self.slope @ v + (products @ self.bend.share) @ self.bend.shape
+        second_order = self.rows + self.slope @ v + (products @ self.bend.share) @ self.bend.shape
+        return second_order + self.curve.at(v)
 
-    def __call__(self, t: Float[Array, " n+2"]) -> Float[Array, ""]:
-        """The log density, up to a constant."""
+    def of_point(self, t: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """The log density of points at that of ``t``, up to a constant."""
         point = self.point(t)
         return self.likelihood(self.predicted(t), point) + self.prior(point)
+
+    def __call__(self, t: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """The log density over t, up to a constant."""
+        return self.of_point(t) + self.log_volume(t)
+
+    def log_volumes(self, ts: Float[np.ndarray, "w n+2"]) -> Float[np.ndarray, " w"]:
+        """:meth:`log_volume` at several t."""
+        return np.asarray(_log_volumes(self, jnp.asarray(ts)))
 
     def points(self, ts: Float[np.ndarray, "*w n+2"]) -> Float[np.ndarray, "*w n+2"]:
         """The points at several t, which are in standard deviations."""
@@ -193,11 +251,12 @@ class Surrogate(eqx.Module):
 
     def coordinates(self, points: Float[np.ndarray, "w n+2"]) -> Float[np.ndarray, "w n+2"]:
         """The t of several points, in standard deviations."""
-        v = np.linalg.solve(np.asarray(self.scale), (points - np.asarray(self.centre)).T).T
+        y = _coordinates(self.straightened, jnp.asarray(points))
+        v = np.linalg.solve(np.asarray(self.scale), np.asarray(y).T).T
         split = v.shape[1] - len(NUISANCE)
         return np.concatenate([self.map.inverse(v[:, :split]), v[:, split:]], axis=1)
 
-    def _straight(self, t: Array) -> Array:
+    def _mapped(self, t: Array) -> Array:
         split = t.size - len(NUISANCE)
         return jnp.concatenate([self.map(t[:split]), t[split:]])
 
@@ -207,10 +266,38 @@ def _points(surrogate: Surrogate, ts: Array) -> Array:
     return jax.vmap(surrogate.point)(ts)
 
 
+@eqx.filter_jit
+def _coordinates(straightened: Straightened, points: Array) -> Array:
+    return jax.vmap(straightened.coordinates)(points)
+
+
+@eqx.filter_jit
+def _log_volumes(surrogate: Surrogate, ts: Array) -> Array:
+    return jax.vmap(surrogate.log_volume)(ts)
+
+
 def no_bend(rows: int) -> Bend:
     """Second derivatives of a linear surrogate."""
     nothing = np.zeros(0, dtype=int)
     return Bend(nothing, nothing, jnp.zeros((0, 0)), jnp.zeros((0, rows)))
+
+
+def no_curve(axes: int, rows: int) -> Curve:
+    """Nothing beyond second order."""
+    return Curve(jnp.zeros((axes, PLACES.size + 1, 0)), jnp.zeros((0, rows)))
+
+
+def curve_of(left: Float[np.ndarray, "n 6 m"], weight: Float[np.ndarray, " m"]) -> Curve:
+    """The curve of what second order leaves of rows at the places along each axis.
+
+    ``weight`` (m,) is one over the rows' deviations.
+    """
+    values = (left / PLACES[:, None] ** 2 * weight).reshape(-1, weight.size)
+    over, sizes, shape = np.linalg.svd(values, full_matrices=False)
+    share = (over[:, :SHAPES] * sizes[:SHAPES]).reshape(*left.shape[:2], -1)
+    return Curve(
+        jnp.asarray(np.insert(share, PLACES.size // 2, 0.0, axis=1)), jnp.asarray(shape[:SHAPES] / weight)
+    )
 
 
 def bend_of(second: Float[np.ndarray, "n n m"], weight: Float[np.ndarray, " m"]) -> Bend:

@@ -25,17 +25,21 @@ from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.near_mode import (
+    PLACES,
     ExactModel,
     LinearisationPoint,
     SampledProblem,
     Surrogate,
     bend_of,
+    curve_of,
     identity_map,
     no_bend,
+    no_curve,
     triangular_map_of,
 )
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
+from savgs_ident.inference.straightened import straightened_about
 
 LONGEST = 1.0
 """Longest axis [unconstrained coordinates]: an e-fold of an identified parameter, a tolerance of the others. A
@@ -308,17 +312,23 @@ def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Sur
     return Surrogate(
         likelihood=posterior.likelihood,
         prior=posterior.prior,
-        centre=jnp.asarray(np.concatenate([at.point[:-2], means])),
+        straightened=straightened_about(posterior.prior.free, np.concatenate([at.point[:-2], means])),
         scale=jnp.asarray(scale),
         rows=jnp.asarray(at.rows),
         slope=jnp.asarray(slope),
         bend=no_bend(at.rows.size),
+        curve=no_curve(slope.shape[1], at.rows.size),
         map=identity_map(slope.shape[1]),
     )
 
 
 BENT = 0.5
 """Second derivative [noise sd] beyond which an axis is explored to its other side too."""
+
+
+CURVED = 0.1
+"""Second derivative [noise sd] beyond which rows along an axis are exact further out, too. Origin: three standard
+deviations away it makes half a one of the rows."""
 
 
 class Expansion(NamedTuple):
@@ -335,28 +345,62 @@ def expand(posterior: PosteriorDensity, at: LinearisationPoint, report: Progress
     weight = 1.0 / np.sqrt(np.asarray(posterior.likelihood.spread(linear.centre)))
     report(f"second derivatives of the response along {axes.shape[1]} axes")
     exact = posterior.problem.exact(posterior.likelihood, jnp.asarray(at.point[:-2]), at.warm_start)
-    second = _second_derivatives(posterior, at, exact, axes, weight)
+    second = _second_derivatives(posterior, at, exact, linear, weight)
     bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))
-    surrogate = eqx.tree_at(lambda each: (each.bend, each.map), linear, bent)
-    return Expansion(exact, surrogate)
+    quadratic: Surrogate = eqx.tree_at(lambda each: (each.bend, each.map), linear, bent)
+    own = np.linalg.norm(np.einsum("iim->im", second) * weight, axis=1)
+    axes_that_bend = np.flatnonzero(own > CURVED)
+    report(f"responses further out along {axes_that_bend.size} axes that bend")
+    left = _left_along_axes(exact, quadratic, axes_that_bend)
+    return Expansion(exact, eqx.tree_at(lambda each: each.curve, quadratic, curve_of(left, weight)))
+
+
+def _left_along_axes(
+    exact: ExactModel, surrogate: Surrogate, bent: Float[np.ndarray, " b"]
+) -> Float[np.ndarray, "n 6 m"]:
+    """What a surrogate leaves of the rows at the places along its axes, of those that ``bent``.
+
+    Where the model is not solved, further out than the last place where it was, as much as there, by v^2.
+    """
+    count = surrogate.slope.shape[1]
+    left = np.zeros((count, PLACES.size, surrogate.rows.size))
+    if not bent.size:
+        return left
+    v = np.zeros((bent.size, PLACES.size, count + 2))
+    v[np.arange(bent.size), :, bent] = PLACES
+    y = v.reshape(-1, count + 2) @ np.asarray(surrogate.scale).T
+    points = np.asarray(jax.vmap(surrogate.straightened.points)(jnp.asarray(y)))
+    rows, solved = exact.rows(points[:, :-2])
+    made_up = np.asarray(jax.vmap(surrogate.rows_at)(jnp.asarray(v.reshape(-1, count + 2)[:, :-2])))
+    left[bent] = np.where(solved[:, None], rows - made_up, np.nan).reshape(bent.size, PLACES.size, -1)
+    middle = PLACES.size // 2
+    for outward in (range(middle, PLACES.size), range(middle - 1, -1, -1)):
+        inner = np.zeros((count, surrogate.rows.size))
+        for place in outward:
+            inner = np.where(np.isfinite(left[:, place]), left[:, place] / PLACES[place] ** 2, inner)
+            left[:, place] = inner * PLACES[place] ** 2
+    return left
 
 
 def _second_derivatives(
     posterior: PosteriorDensity,
     at: LinearisationPoint,
     exact: ExactModel,
-    axes: Float[np.ndarray, "n n"],
+    linear: Surrogate,
     weight: Float[np.ndarray, " m"],
 ) -> Float[np.ndarray, "n n m"]:
     """Differences of the slopes one standard deviation ahead; of both sides where an axis bends much.
 
     An axis whose sides were not solved counts as straight: the exact model decides in the end.
     """
+    axes, straightened = np.asarray(linear.scale)[:-2, :-2], linear.straightened
 
     def slopes_at(shift: np.ndarray) -> np.ndarray | None:
-        u = jnp.asarray(at.point[:-2] + shift)
+        y = jnp.append(jnp.asarray(shift), jnp.zeros(2))
+        u = straightened.points(y)[:-2]
         found = posterior.problem.linear_rows(posterior.likelihood, u, at.warm_start, exact.predicted(u))
-        return np.asarray((found.slopes @ axes).T) if found.status.ok else None
+        by_axis = (found.slopes * np.asarray(straightened.slopes(y))[:-2]) @ axes
+        return np.asarray(by_axis.T) if found.status.ok else None
 
     here = (at.slopes @ axes).T
     ahead = in_parallel(slopes_at, axes.T)

@@ -97,7 +97,7 @@ class Sheet(AbstractCoordinate):
 
     def at(self, value: float) -> float:
         """The coordinate of a value [unit]; raises :class:`InputError` outside the parameter's bounds."""
-        return self._transform.inverse(move_inside(self.parameter, value)) / self._width
+        return float(self._transform.inverse(move_inside(self.parameter, value))) / self._width
 
     @cached_property
     def _transform(self) -> AbstractBijection:

@@ -2,14 +2,16 @@
 
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.inference.near_mode import SHAPES, bend_of
+from savgs_ident.inference.near_mode import SHAPES, LinearisationPoint, bend_of
+from savgs_ident.inference.posterior_mode import linear_surrogate
 
 from .toy import Toy, bent_toy
-from .toy_surrogate import Stand, stand_for
+from .toy_surrogate import Stand, density_of, mode_of, stand_for
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +70,26 @@ def test_points_and_coordinates_are_one_to_one(rough: Stand) -> None:
     np.testing.assert_array_equal(rough.surrogate.points(ts.reshape(5, 10, 5)), points.reshape(5, 10, 5))
 
 
+def test_its_density_over_t_has_the_volume_of_its_points(bent: Toy) -> None:
+    posterior, point = density_of(bent), mode_of(bent)
+    rows, slopes = bent.rows(point[None, :-2])[0][0], bent.slopes(point[:-2])
+    straight = linear_surrogate(posterior, LinearisationPoint(point, rows, slopes, None, 0.0))  # type: ignore[arg-type]
+
+    def volume(t: np.ndarray) -> float:
+        return float(np.linalg.slogdet(np.asarray(jax.jacfwd(straight.point)(jnp.asarray(t))))[1])
+
+    ts = np.random.default_rng(4).standard_normal((5, 5))
+    found = [volume(t) - volume(np.zeros(5)) for t in ts]
+    assert np.max(np.abs(found)) > 1e-3
+    np.testing.assert_allclose(straight.log_volumes(ts), found, atol=1e-9)
+    for t, each in zip(ts, found, strict=True):
+        assert float(straight(jnp.asarray(t)) - straight.of_point(jnp.asarray(t))) == pytest.approx(each)
+
+
 def test_its_density_is_that_of_its_rows(rough: Stand, bent: Toy) -> None:
     surrogate, posterior = rough.surrogate, rough.posterior
     t = jnp.asarray([0.3, -1.0, 0.2, 0.5, 1.2])
     point = surrogate.points(np.asarray(t)[None])[0]
-    assert float(surrogate(t)) == pytest.approx(posterior.density(np.asarray(surrogate.predicted(t)), point))
+    assert float(surrogate.of_point(t)) == pytest.approx(
+        posterior.density(np.asarray(surrogate.predicted(t)), point)
+    )

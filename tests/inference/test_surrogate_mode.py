@@ -37,7 +37,7 @@ def test_with_a_parameter_held_the_others_make_the_best_of_it(bent: Toy, rough: 
 
     def depth(rest: np.ndarray) -> float:
         point = np.insert(rest, place, level * free.widths[place])
-        return -float(rough.surrogate(rough.surrogate.coordinates(point[None])[0]))
+        return -float(rough.surrogate.of_point(rough.surrogate.coordinates(point[None])[0]))
 
     scales = bent.likelihood.scales.coordinates(held.noise_scales.noise, held.noise_scales.discrepancy)
     start = np.delete(np.append(held.x * free.widths, scales), place) + 0.02

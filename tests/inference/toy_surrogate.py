@@ -52,11 +52,15 @@ def mode_of(toy: Toy) -> NDArray[np.float64]:
 
 
 def stand_for(toy: Toy, slope_share: float = 1.0, bend_share: float = 1.0) -> Stand:
-    """The surrogate about the mode, with this share of its slopes and second derivatives there."""
+    """The surrogate about the mode, with this share of its slopes and second derivatives there.
+
+    The toy is a polynomial of u: the surrogate is one of the same, not of straightened coordinates.
+    """
     posterior, point = density_of(toy), mode_of(toy)
     rows = toy.rows(point[None, :-2])[0][0]
     slopes = slope_share * toy.slopes(point[:-2])
     linear = linear_surrogate(posterior, LinearisationPoint(point, rows, slopes, None, 0.0))  # type: ignore[arg-type]
+    linear = eqx.tree_at(lambda each: each.straightened.rate, linear, jnp.zeros(point.size))
     axes = np.asarray(linear.scale)[:-2, :-2]
     weight = 1.0 / np.sqrt(np.asarray(toy.likelihood.spread(linear.centre)))
     at_point = toy.bend.copy()

@@ -138,4 +138,6 @@ class _Tally:
         """The last draws of chains on the surrogate, and the surrogate's log density here less that there."""
         begin = self.surrogate.coordinates(points)
         end, before, after = pcn_steps(self.surrogate, int(random.randint(2**31)), begin)
-        return self.surrogate.points(end), before - after
+        # The walkers are points: of the densities over t their volumes are taken.
+        volume = self.surrogate.log_volumes(begin) - self.surrogate.log_volumes(end)
+        return self.surrogate.points(end), before - after - volume

@@ -115,7 +115,7 @@ def begin(exact: ExactModel, surrogate: Surrogate, seed: int) -> tuple[State, in
         accepted=nothing.astype(bool),
         proposal_log_ratio=nothing,
         t=t,
-        present=np.stack([found.log_density, found.log_density - log_surrogate]),
+        present=_with_log_ratio(surrogate, t, found.log_density, log_surrogate),
         step_size=step_size,
         divergences=np.array(0),
     )
@@ -128,7 +128,7 @@ def advance(exact: ExactModel, surrogate: Surrogate, seed: int, state: State) ->
     key = jax.random.fold_in(jax.random.PRNGKey(seed), step)
     t, log_surrogate, diverged = nuts_transitions(surrogate, key, state.t, state.step_size, TRANSITIONS)
     found = decide(exact, surrogate.prior, surrogate.points(t))
-    proposed = np.stack([found.log_density, found.log_density - log_surrogate])
+    proposed = _with_log_ratio(surrogate, t, found.log_density, log_surrogate)
     uniform = np.random.default_rng((seed, step)).random(len(t))
     # A chain that stands where the model is not solved compares minus infinity with itself, and goes anywhere.
     with np.errstate(invalid="ignore"):
@@ -146,6 +146,16 @@ def advance(exact: ExactModel, surrogate: Surrogate, seed: int, state: State) ->
         divergences=state.divergences + diverged,
     )
     return later, int(np.sum(~found.solved))
+
+
+def _with_log_ratio(
+    surrogate: Surrogate,
+    t: Float[np.ndarray, "C n+2"],
+    log_density: Float[np.ndarray, " C"],
+    log_surrogate: Float[np.ndarray, " C"],
+) -> Float[np.ndarray, "2 C"]:
+    """The log densities of points, and log w: both densities over t."""
+    return np.stack([log_density, log_density + surrogate.log_volumes(t) - log_surrogate])
 
 
 def nuts_transitions(
