@@ -4,6 +4,7 @@
     python -m benchmarks --quick                          four dwells, two minutes of MCAP, few draws
     python -m benchmarks --only response --only scipy --json benchmarks.json
     python -m benchmarks --only sindy --trials out/blind out/foreign
+    python -m benchmarks --profile docs/profile.md        where the time of each command goes
 
 Progress goes to standard error, the table to standard output.
 """
@@ -43,6 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         default=TRIALS,
         help="what `savgs-ident blind` wrote, own or `--foreign`, for `sindy`",
     )
+    parser.add_argument(
+        "--profile", type=Path, metavar="FILE", help="write where the time of each command goes, nothing else"
+    )
     options = parser.parse_args(arguments)
 
     # Results are fetched at once everywhere here; handing each call to another thread only delays them.
@@ -53,6 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     def progress(line: str) -> None:
         print(f"{time.perf_counter() - began:7.1f} s  {line}", file=sys.stderr, flush=True)
 
+    if options.profile is not None:
+        from benchmarks.profile import profile
+
+        options.profile.write_text(profile(progress))
+        return
     machine = describe_machine()
     outcome = run_suite(options.only or NAMES, size, progress)
     notes = (f"{len(size.dwells_hz)} dwells.", *outcome.notes)
