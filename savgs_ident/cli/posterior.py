@@ -54,7 +54,7 @@ def posterior(
             min=0.0,
             help="Go on beyond the target up to this, for medians to a fortieth of their sd.",
         ),
-    ] = 85.0,
+    ] = 30.0,
     max_frequency: MaxFrequencyOption = None,
     orders: OrdersOption = 9,
     seed: SeedOption = 1,

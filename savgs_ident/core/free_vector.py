@@ -71,7 +71,7 @@ class FreeVector(eqx.Module):
             raise InputError(f"the value of parameter '{missing[0]}' is missing", remedy="give all free ones")
         inside = [move_inside(parameter, float(values[parameter.name])) for parameter in self.parameters]
         pairs = zip(self._bijections(), inside, strict=True)
-        return jnp.asarray([bijection.inverse(value) for bijection, value in pairs], float)
+        return jnp.asarray(np.array([bijection.inverse(value) for bijection, value in pairs], float))
 
     def coordinates(self, values: Float[Array, " n"]) -> Float[Array, " n"]:
         """The vector [1] of ``values`` [SI unit of each], in the order of the names, strictly inside the bounds."""

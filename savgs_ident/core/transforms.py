@@ -22,11 +22,12 @@ is known, whether the parameter is to be identified or not, and :data:`WIDTH` wh
 typical is known to an order of magnitude (:class:`OrdersOfMagnitude`).
 """
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import lru_cache
 from math import exp, inf, isfinite, log
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -51,12 +52,15 @@ ORDER = log(10.0)
 _ORDERS = 3.0
 """Most orders of magnitude that such a number is off. Beyond, a contact is as hard as any, and no motion is found."""
 
+# Searches ask for the maps of their parameters at every step.
+_KEPT = 4096
+
 _INSIDE = 0.01
 # Without a bound the map bends only this many standard deviations away: finite, to keep slopes finite.
 _FAR = 1e12
 
 
-class AbstractBijection(eqx.Module):
+class AbstractBijection(ABC):
     """A smooth, increasing map from an unconstrained coordinate to the open range of a parameter.
 
     ``forward`` and ``inverse`` work element by element, on numbers and on arrays of NumPy or JAX: maps of one kind
@@ -76,6 +80,8 @@ class AbstractBijection(eqx.Module):
         """d value / du at a number ``u`` [unit of the parameter]."""
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class Tolerated(AbstractBijection):
     """Standard deviations from the nominal value, bending only in the outer half of the way to a bound.
 
@@ -112,6 +118,8 @@ class Tolerated(AbstractBijection):
         return self.tolerance / (1.0 + beyond * beyond) ** 1.5
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class OrdersOfMagnitude(AbstractBijection):
     """Orders of magnitude from a typical value, :class:`Tolerated` as a logarithm: never more than three of them."""
 
@@ -131,6 +139,8 @@ class OrdersOfMagnitude(AbstractBijection):
         return float(self.forward(u)) * self.orders.slope(u)
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class OneSided(AbstractBijection):
     """The log of the distance to one bound; ``sign`` is 1 for a lower bound and -1 for an upper one.
 
@@ -154,6 +164,8 @@ class OneSided(AbstractBijection):
         return self.scale * exp(self.sign * u)
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class TwoSided(AbstractBijection):
     """A logistic curve between two bounds, through the start value at u = 0.
 
@@ -184,6 +196,8 @@ class TwoSided(AbstractBijection):
         return (self.upper - self.lower) * float(expit(shifted)) * float(expit(-shifted))
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class Unbounded(AbstractBijection):
     """A shift and a scale, for a parameter without bounds, both in its unit."""
 
@@ -203,6 +217,7 @@ class Unbounded(AbstractBijection):
         return self.scale
 
 
+@lru_cache(_KEPT)
 def transform_of(parameter: Parameter) -> AbstractBijection:
     """The map of a parameter, by what is known of it beforehand.
 
@@ -219,6 +234,7 @@ def transform_of(parameter: Parameter) -> AbstractBijection:
     )
 
 
+@lru_cache(_KEPT)
 def prior_width(parameter: Parameter) -> float:
     """Standard deviation of a parameter's coordinate before the data [1]."""
     return 1.0 if isinstance(transform_of(parameter), Tolerated | OrdersOfMagnitude) else WIDTH

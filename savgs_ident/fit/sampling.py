@@ -48,7 +48,7 @@ def sample(
     *,
     target_ess: float = 1000.0,
     time_limit: float = 600.0,
-    patience: float = 85.0,
+    patience: float = 30.0,
     fixed_tolerances: bool = False,
     max_frequency: float | None = None,
     orders: int = 9,

@@ -212,10 +212,10 @@ class SurrogatePlant:
         surrogate, free = self.surrogate, self.surrogate.prior.free
         u = np.asarray(free.to_unconstrained(values))
         axes = np.asarray(surrogate.scale)[: u.size, : u.size]
-        y = surrogate.straightened.coordinates(jnp.append(jnp.asarray(u), surrogate.centre[u.size :]))
-        v = np.linalg.solve(axes, np.asarray(y)[: u.size])
+        y, along = (np.asarray(each)[: u.size] for each in _straightened(surrogate, jnp.asarray(u)))
+        v = np.linalg.solve(axes, y)
         rows, slopes = (np.asarray(each) for each in _rows_and_slopes(surrogate, jnp.asarray(v)))
-        by_free = np.linalg.solve(axes.T, slopes.T).T / np.asarray(surrogate.straightened.slopes(y))[: u.size]
+        by_free = np.linalg.solve(axes.T, slopes.T).T / along
         by_value = by_free / np.asarray(free.jacobian_diag(jnp.asarray(u)))
         return Prediction(rows, lambda: by_value, Status.CONVERGED, None)
 
@@ -343,6 +343,13 @@ def _laplace_sd(
         )
         found[name] = float(abs(np.diff(moved[name])[0]) / _STEP * deviation[place])
     return found
+
+
+@eqx.filter_jit
+def _straightened(surrogate: Surrogate, u: Array) -> tuple[Array, Array]:
+    """Straightened coordinates of ``u`` (n,), and du / dy there, (n + 2,) each."""
+    y = surrogate.straightened.coordinates(jnp.append(u, surrogate.centre[u.size :]))
+    return y, surrogate.straightened.slopes(y)
 
 
 @eqx.filter_jit

@@ -195,7 +195,8 @@ class Surrogate(eqx.Module):
     """Log density over t (n + 2,); ``rows`` (m,) and ``slope`` (m, n) are the model's at v = 0.
 
     t is in standard deviations, rows are in the unit of their reading. Axes ``scale`` are those of ``straightened``
-    coordinates.
+    coordinates. The map takes ``middle`` + ``width`` t, both (n + 2,) [1]: where the density lies and how wide it is,
+    which its curvature in one point does not say.
     """
 
     likelihood: RowLikelihood
@@ -207,10 +208,12 @@ class Surrogate(eqx.Module):
     bend: Bend
     curve: Curve
     map: TriangularMap
+    middle: Float[Array, " n+2"]
+    width: Float[Array, " n+2"]
 
     @property
     def centre(self) -> Float[Array, " n+2"]:
-        """The point of the posterior [free coordinates, 1] at t = 0."""
+        """The point of the posterior [free coordinates, 1] that it was made about."""
         return self.straightened.centre
 
     def point(self, t: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
@@ -218,7 +221,7 @@ class Surrogate(eqx.Module):
         return self.straightened.points(self.scale @ self._mapped(t))
 
     def log_volume(self, t: Float[Array, " n+2"]) -> Float[Array, ""]:
-        """Logarithm of the volume of points to that of ``t``, 0 in the centre."""
+        """Logarithm of the volume of points to that of ``t``, but for a constant."""
         return jnp.sum(jnp.log(self.straightened.slopes(self.scale @ self._mapped(t))))
 
     def predicted(self, t: Float[Array, " n+2"]) -> Float[Array, " m"]:
@@ -254,11 +257,19 @@ class Surrogate(eqx.Module):
         y = _coordinates(self.straightened, jnp.asarray(points))
         v = np.linalg.solve(np.asarray(self.scale), np.asarray(y).T).T
         split = v.shape[1] - len(NUISANCE)
-        return np.concatenate([self.map.inverse(v[:, :split]), v[:, split:]], axis=1)
+        t = np.concatenate([self.map.inverse(v[:, :split]), v[:, split:]], axis=1)
+        return np.asarray((t - np.asarray(self.middle)) / np.asarray(self.width))
+
+    def with_draws(self, ts: Float[np.ndarray, "w n+2"]) -> "Surrogate":
+        """The same with a t that is about zero and one wide in draws of it."""
+        middle = self.middle + self.width * jnp.asarray(ts.mean(axis=0))
+        width = self.width * jnp.asarray(ts.std(axis=0))
+        found: Surrogate = eqx.tree_at(lambda each: (each.middle, each.width), self, (middle, width))
+        return found
 
     def _mapped(self, t: Array) -> Array:
-        split = t.size - len(NUISANCE)
-        return jnp.concatenate([self.map(t[:split]), t[split:]])
+        split, wide = t.size - len(NUISANCE), self.middle + self.width * t
+        return jnp.concatenate([self.map(wide[:split]), wide[split:]])
 
 
 @eqx.filter_jit

@@ -319,6 +319,8 @@ def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Sur
         bend=no_bend(at.rows.size),
         curve=no_curve(slope.shape[1], at.rows.size),
         map=identity_map(slope.shape[1]),
+        middle=jnp.zeros(point.size),
+        width=jnp.ones(point.size),
     )
 
 
@@ -368,10 +370,8 @@ def _left_along_axes(
         return left
     v = np.zeros((bent.size, PLACES.size, count + 2))
     v[np.arange(bent.size), :, bent] = PLACES
-    y = v.reshape(-1, count + 2) @ np.asarray(surrogate.scale).T
-    points = np.asarray(jax.vmap(surrogate.straightened.points)(jnp.asarray(y)))
+    points, made_up = (np.asarray(each) for each in _at(surrogate, jnp.asarray(v.reshape(-1, count + 2))))
     rows, solved = exact.rows(points[:, :-2])
-    made_up = np.asarray(jax.vmap(surrogate.rows_at)(jnp.asarray(v.reshape(-1, count + 2)[:, :-2])))
     left[bent] = np.where(solved[:, None], rows - made_up, np.nan).reshape(bent.size, PLACES.size, -1)
     middle = PLACES.size // 2
     for outward in (range(middle, PLACES.size), range(middle - 1, -1, -1)):
@@ -380,6 +380,13 @@ def _left_along_axes(
             inner = np.where(np.isfinite(left[:, place]), left[:, place] / PLACES[place] ** 2, inner)
             left[:, place] = inner * PLACES[place] ** 2
     return left
+
+
+@eqx.filter_jit
+def _at(surrogate: Surrogate, v: Array) -> tuple[Array, Array]:
+    """Points and rows of a surrogate at ``v`` (w, n + 2) in standard deviations."""
+    points = jax.vmap(lambda each: surrogate.straightened.points(surrogate.scale @ each))(v)
+    return points, jax.vmap(surrogate.rows_at)(v[:, :-2])
 
 
 def _second_derivatives(

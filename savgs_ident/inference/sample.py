@@ -52,7 +52,7 @@ from savgs_ident.inference.samplers.chains import (
     new_checkpoint,
     open_checkpoint,
 )
-from savgs_ident.inference.samplers.emcee import sample_by_emcee
+from savgs_ident.inference.samplers.emcee import about_draws, sample_by_emcee
 from savgs_ident.inference.samplers.nuts import sample_by_nuts
 from savgs_ident.plants.model import Model
 
@@ -148,6 +148,7 @@ def sample_posterior(
     located = find_mode_with_background(posed.density, mode.linearisation_point, drifting, report)
     posterior, mode = located.density, located.mode
     expansion = expand(posterior, mode.linearisation_point, report)
+    expansion = expansion._replace(surrogate=about_draws(expansion.surrogate, settings.seed))
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")

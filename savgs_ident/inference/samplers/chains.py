@@ -185,7 +185,7 @@ class SamplingSettings:
     sampler: Sampler = "emcee"
     target_ess: float = 1000.0
     time_limit_s: float = 600.0
-    patience_s: float = 85.0
+    patience_s: float = 30.0
     fixed_tolerances: bool = False
     orders: int = 9
     seed: int = 1

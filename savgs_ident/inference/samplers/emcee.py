@@ -29,11 +29,26 @@ from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, steps_without_density
 from savgs_ident.simulate.program_cache import placed, run_cached
 
-STEPS = 60
+STEPS = 120
 """Steps to one proposal: enough to forget where it began."""
+
+DRAWS = 128
+"""Chains on the surrogate that say where it lies and how wide it is."""
+
+_ROUNDS = 3
 
 LENGTHS = (0.2, 0.5, 0.8)
 """The b of steps, drawn at random: long ones travel, short ones get through where the surrogate is not normal."""
+
+
+def about_draws(surrogate: Surrogate, seed: int) -> Surrogate:
+    """The surrogate in coordinates in which it is about as wide as the normal of the steps.
+
+    Its curvature in one point says that of a skew density only in part, and steps hardly get anywhere along an axis
+    along which it is twice as wide.
+    """
+    drawn, _, _ = pcn_steps(surrogate, seed, np.zeros((DRAWS, surrogate.centre.size)), _ROUNDS)
+    return surrogate.with_draws(drawn)
 
 
 def pcn_steps(
@@ -77,7 +92,7 @@ WALKERS = 8
 BURN_IN = 4
 """Steps left out at least: the walkers begin on the surrogate, a step or two from the posterior."""
 
-_FIRST_ROUNDS = 20
+_FIRST_ROUNDS = 5
 _STRIDE = 4
 
 
