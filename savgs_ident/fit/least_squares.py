@@ -274,7 +274,9 @@ def _starts(task: Task, most: int, values: Mapping[str, float]) -> list[Array]:
     count, starts = len(free.identified), [first]
     for number in range(1, most):
         signs = [1.0 if (number >> (place % 4)) & 1 else -1.0 for place in range(count)]
-        starts.append(first.at[:count].add(_SHIFT * jnp.asarray(signs)))
+        shifted = np.array(first)
+        shifted[:count] += _SHIFT * np.array(signs)
+        starts.append(jnp.asarray(shifted))
     return starts
 
 

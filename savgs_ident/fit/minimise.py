@@ -138,9 +138,9 @@ class Minimiser(eqx.Module):
         status, before, in_vain = Status.MAX_ITERATIONS, np.inf, 0
         for count in range(1, steps + 1):
             u, state, done, fine = _step(self.solver, u, trial.at, state)
-            taken = bool(jnp.all(u == trial.at.u))
+            taken = np.array_equal(u, trial.at.u)
             best, in_vain = (trial, 0) if taken else (best, in_vain + 1)
-            cost = float(jnp.sum(best.at.residual**2))
+            cost = float(np.sum(np.asarray(best.at.residual) ** 2))
             if not (fine and best.finite):
                 status = Status.NOT_FINITE if best.status.ok else best.status
                 break

@@ -27,8 +27,8 @@ from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution, adapt, resolve, solve_near
 from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.readings import harmonics, harmonics_of
-from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
+from savgs_ident.simulate.readings import harmonics_of
+from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities, trajectory_sensitivities
 
 ENOUGH = 1e-4
 """Last relative Newton step at which a motion near the anchor counts as solved; what is left is far smaller, and that
@@ -114,7 +114,9 @@ class SampledHarmonics(NamedTuple):
         problem, u = self.problem, placed(u)
         p = problem.parameters(u)
         solution = resolve(problem.model, p, warm_start, problem.iterations, predicted)
-        rows, slopes = _linear_rows(problem, likelihood, u, p, solution)
+        names, orders = problem.free.names, problem.orders
+        seen, by_name = harmonics_with_sensitivities(problem.model, p, solution, names, orders)
+        rows, slopes = _rows_and_slopes(problem.free, likelihood, u, seen, by_name)
         return LinearRows(np.asarray(rows), np.asarray(slopes), solution, joint_status(solution.status()))
 
     def refined(self, u: Float[Array, " n"], warm_start: PeriodicSolution) -> PeriodicSolution:
@@ -146,16 +148,11 @@ class SampledHarmonics(NamedTuple):
 
 
 @eqx.filter_jit
-def _linear_rows(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_rows_and_derivatives, *args)
-
-
-def _rows_and_derivatives(
-    problem: Problem, likelihood: Likelihood, u: Array, p: Any, solution: PeriodicSolution
+def _rows_and_slopes(
+    free: FreeVector, likelihood: Likelihood, u: Array, predicted: Array, by_name: Array
 ) -> tuple[Array, Array]:
-    by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
-    slopes = jax.vmap(likelihood.rows)(by_name).T * problem.slopes(u)
-    return likelihood.rows(harmonics(problem.model, p, solution, problem.orders)), slopes
+    slopes = jax.vmap(likelihood.rows)(by_name).T * free.jacobian_diag(u)
+    return likelihood.rows(predicted), slopes
 
 
 @eqx.filter_jit

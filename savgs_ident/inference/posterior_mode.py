@@ -99,6 +99,11 @@ def nuisance_scale(
 
 
 @eqx.filter_jit
+def _log_density(likelihood: RowLikelihood, prior: Prior, rows: Array, point: Array) -> Array:
+    return likelihood(rows, point) + prior(point)
+
+
+@eqx.filter_jit
 def _log_densities(likelihood: RowLikelihood, prior: Prior, rows: Array, points: Array) -> Array:
     return jax.vmap(lambda point: likelihood(rows, point) + prior(point))(points)
 
@@ -129,8 +134,7 @@ class PosteriorDensity(NamedTuple):
 
     def density(self, rows: Float[np.ndarray, " m"], point: Float[np.ndarray, " n+2"]) -> float:
         """The log density of a point where the model has ``rows``."""
-        x = jnp.asarray(point)
-        return float(self.likelihood(jnp.asarray(rows), x) + self.prior(x))
+        return float(_log_density(self.likelihood, self.prior, jnp.asarray(rows), jnp.asarray(point)))
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ by the implicit function theorem, chained through target and coordinates.
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.core.errors import InputError
@@ -27,9 +28,9 @@ from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve
-from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.readings import harmonics
-from savgs_ident.simulate.sensitivity import harmonic_sensitivities
+from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities
 
 
 class Pins(NamedTuple):
@@ -126,7 +127,7 @@ class Evaluation(NamedTuple):
     @property
     def finite(self) -> bool:
         """Whether residuals and Jacobian are numbers: enough to step on from, not to end at."""
-        return bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all())
+        return bool(np.isfinite(self.at.residual).all() and np.isfinite(self.at.jacobian).all())
 
 
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, warm_start: PeriodicSolution) -> Evaluation:
@@ -149,36 +150,36 @@ def evaluate_beside(problem: Problem, u: Float[Array, " n"], pins: Pins, best: E
     p = problem.parameters(u)
     solution = resolve(problem.model, p, best.solution, problem.iterations)
     residual = _residual_at(problem, pins, u, p, solution)
-    if jnp.sum(residual**2) < jnp.sum(best.at.residual**2):
+    if np.sum(np.asarray(residual) ** 2) < np.sum(np.asarray(best.at.residual) ** 2):
         return _evaluation(problem, pins, u, p, solution)
     return Evaluation(Linearised(u, residual, best.at.jacobian), solution)
 
 
 def _evaluation(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Evaluation:
-    residual, jacobian = _compared(problem, pins, u, p, solution)
+    names, orders = problem.free.names, problem.orders
+    predicted, by_name = harmonics_with_sensitivities(problem.model, p, solution, names, orders)
+    residual, jacobian = _residual_and_jacobian(problem.free, problem.target, pins, u, predicted, by_name)
     return Evaluation(Linearised(u, residual, jacobian), solution)
 
 
 @eqx.filter_jit
-def _compared(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_residual_and_jacobian, *args)
-
-
 def _residual_and_jacobian(
-    problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution
+    free: FreeVector, target: Target, pins: Pins, u: Array, predicted: Array, by_name: Array
 ) -> tuple[Array, Array]:
-    predicted = harmonics(problem.model, p, solution, problem.orders)
-    by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
-    columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
-    priors = jax.jacfwd(problem.free.prior_residuals)(u)
-    jacobian = jnp.concatenate([columns.T * problem.slopes(u), priors, jnp.diag(pins.weight)])
-    return _residual_at(problem, pins, u, p, solution), jacobian
+    columns = jax.vmap(lambda change: jax.jvp(target, (predicted,), (change,))[1])(by_name)
+    priors = jax.jacfwd(free.prior_residuals)(u)
+    jacobian = jnp.concatenate([columns.T * free.jacobian_diag(u), priors, jnp.diag(pins.weight)])
+    return _residual(free, target, pins, u, predicted), jacobian
 
 
 @eqx.filter_jit
 def _residual_at(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Array:
-    data = problem.target(harmonics(problem.model, p, solution, problem.orders))
-    return jnp.concatenate([data, problem.free.prior_residuals(u), pins.weight * (u - pins.at)])
+    predicted = harmonics(problem.model, p, solution, problem.orders)
+    return _residual(problem.free, problem.target, pins, u, predicted)
+
+
+def _residual(free: FreeVector, target: Target, pins: Pins, u: Array, predicted: Array) -> Array:
+    return jnp.concatenate([target(predicted), free.prior_residuals(u), pins.weight * (u - pins.at)])
 
 
 Quantity = Literal["harmonics", "peak_to_peak"]

@@ -203,7 +203,7 @@ class PeriodicSolution(eqx.Module):
 
     def _within_travel(self) -> NDArray[np.bool_]:
         limits = np.asarray(self.travel)[:, None]
-        inside = np.all(np.abs(np.asarray(self.trajectory.x[: len(limits)])) <= limits, axis=0)
+        inside = np.all(np.abs(np.asarray(self.trajectory.x)[: len(limits)]) <= limits, axis=0)
         return np.logical_and.reduceat(inside, self.mesh.layout.starts)
 
 
@@ -354,7 +354,7 @@ def adapt(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, layout: Layout, limit: int
 ) -> PeriodicSolution:
     """The solution again, on nodes that follow its accelerations."""
-    accelerations = np.asarray(solution.trajectory.y[: len(model.coordinates)])
+    accelerations = np.asarray(solution.trajectory.y)[: len(model.coordinates)]
     if not np.isfinite(accelerations).all():
         return solution
     frequency = np.asarray(solution.excitation.frequency) * scale_of_time(model)

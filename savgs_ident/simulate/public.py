@@ -132,7 +132,10 @@ def disable_effects(model: Model) -> Model:
 def merge_responses(one: SimulatedResponse, other: SimulatedResponse) -> SimulatedResponse:
     """Two solutions of one model as one, by growing frequency."""
     order = np.argsort(np.concatenate([one.frequency, other.frequency]), kind="stable")
-    excitation = jax.tree.map(lambda a, b: jnp.concatenate([a, b])[order], one.excitation, other.excitation)
+    # By NumPy: a program for every shape would take longer.
+    excitation = jax.tree.map(
+        lambda a, b: jnp.asarray(np.concatenate([a, b])[order]), one.excitation, other.excitation
+    )
     status = one.status + other.status
     return SimulatedResponse(
         one.model,

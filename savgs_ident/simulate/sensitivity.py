@@ -30,7 +30,8 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.readings import Sensors, harmonics_of, readings_of, sensors_of, shown_by
+from savgs_ident.simulate.program_cache import run_cached
+from savgs_ident.simulate.readings import Sensors, harmonics, harmonics_of, readings_of, sensors_of, shown_by
 
 
 class Directions(NamedTuple):
@@ -83,6 +84,28 @@ def harmonic_sensitivities(
     """
     tangents = jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names)))
     return directional(model, p, solution, orders, directions_of(model, p, tangents, len(names)))
+
+
+def harmonics_with_sensitivities(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+) -> tuple[Complex[Array, "D C K"], Complex[Array, "n D C K"]]:
+    """Harmonics 0..orders of the sensor readings, and their derivatives, by one program for all that asks for them.
+
+    They are in the unit of the reading, and per unit of the parameter.
+    """
+    seen, changes = _seen_with_changes(model, p, solution, names, orders)
+    return seen, changes
+
+
+@eqx.filter_jit
+def _seen_with_changes(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_harmonics_and_changes, *args)
+
+
+def _harmonics_and_changes(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+) -> tuple[Array, ...]:
+    return harmonics(model, p, solution, orders), harmonic_sensitivities(model, p, solution, names, orders)
 
 
 def directional(

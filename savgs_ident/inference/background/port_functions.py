@@ -251,7 +251,13 @@ def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
 
     Filters and angular frequencies ``omega`` [rad/s], on the time scale of the plant, are (dwells, orders) each.
     """
-    return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(omega))]
+    return [np.asarray(each, np.complex128) for each in _filters(jnp.asarray(omega))]
+
+
+# Compiled as a whole, as all of these functions are.
+@eqx.filter_jit
+def _filters(omega: Any) -> list[Any]:
+    return filters(omega)
 
 
 class SensorFunction(NamedTuple):
