@@ -212,11 +212,10 @@ class SurrogatePlant:
         surrogate, free = self.surrogate, self.surrogate.prior.free
         u = np.asarray(free.to_unconstrained(values))
         axes = np.asarray(surrogate.scale)[: u.size, : u.size]
-        y, along = (np.asarray(each)[: u.size] for each in _straightened(surrogate, jnp.asarray(u)))
+        y, along = (np.asarray(each) for each in _straightened(surrogate, jnp.asarray(u)))
         v = np.linalg.solve(axes, y)
         rows, slopes = (np.asarray(each) for each in _rows_and_slopes(surrogate, jnp.asarray(v)))
-        by_free = np.linalg.solve(axes.T, slopes.T).T / along
-        by_value = by_free / np.asarray(free.jacobian_diag(jnp.asarray(u)))
+        by_value = np.linalg.solve(axes.T, slopes.T).T / along
         return Prediction(rows, lambda: by_value, Status.CONVERGED, None)
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: None) -> None:
@@ -347,9 +346,10 @@ def _laplace_sd(
 
 @eqx.filter_jit
 def _straightened(surrogate: Surrogate, u: Array) -> tuple[Array, Array]:
-    """Straightened coordinates of ``u`` (n,), and du / dy there, (n + 2,) each."""
+    """Straightened coordinates of ``u`` (n,), and d value / dy there [SI unit of each value], (n,) each."""
     y = surrogate.straightened.coordinates(jnp.append(u, surrogate.centre[u.size :]))
-    return y, surrogate.straightened.slopes(y)
+    slopes = surrogate.straightened.slopes(y)[: u.size] * surrogate.prior.free.jacobian_diag(u)
+    return y[: u.size], slopes
 
 
 @eqx.filter_jit

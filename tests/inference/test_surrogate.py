@@ -93,3 +93,16 @@ def test_its_density_is_that_of_its_rows(rough: Stand, bent: Toy) -> None:
     assert float(surrogate.of_point(t)) == pytest.approx(
         posterior.density(np.asarray(surrogate.predicted(t)), point)
     )
+
+
+def test_its_coordinates_may_be_those_of_its_draws(rough: Stand) -> None:
+    ts = np.random.default_rng(6).standard_normal((200, 5)) * [0.5, 1.0, 2.0, 3.0, 1.5] + 0.3
+    points = rough.surrogate.points(ts)
+    about = rough.surrogate.with_draws(ts)
+    found = about.coordinates(points)
+    np.testing.assert_allclose(found.mean(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.std(axis=0), 1.0, atol=1e-9)
+    np.testing.assert_allclose(about.points(found), points, atol=1e-9)
+    for old, new in zip(ts[:3], found[:3], strict=True):
+        here, there = rough.surrogate.of_point(jnp.asarray(old)), about.of_point(jnp.asarray(new))
+        assert float(here) == pytest.approx(float(there))
