@@ -15,8 +15,8 @@ from benchmarks.campaign import read_dwells, response_of
 from benchmarks.outcome import Progress
 from savgs_ident.inference.harmonic_question import Question, density_of, locate, plan
 from savgs_ident.inference.near_mode import Surrogate, identity_map
-from savgs_ident.inference.posterior_mode import expand
 from savgs_ident.inference.problem import Problem
+from savgs_ident.inference.sample import expand_about_draws
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.inference.samplers.emcee import pcn_steps
 from savgs_ident.plants.base import Excitation
@@ -55,6 +55,5 @@ def pose_posterior(dwells_hz: Sequence[float], progress: Progress) -> PosteriorP
     task = plan(question, SamplingSettings())
     case = density_of(task)
     mode = locate(case, task, question, progress)
-    return PosteriorProblem(
-        task.problem, task.excitation, expand(case, mode.linearisation_point, progress).surrogate
-    )
+    expansion = expand_about_draws(case, mode.linearisation_point, SamplingSettings().seed, progress)
+    return PosteriorProblem(task.problem, task.excitation, expansion.surrogate)

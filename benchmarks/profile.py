@@ -60,6 +60,7 @@ class Profiled(NamedTuple):
 
 def _run(arguments: Sequence[str], cache: Path, record: Path) -> Profiled:
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    record.unlink(missing_ok=True)
     began = time.perf_counter()
     code = subprocess.run(
         [sys.executable, "-m", "benchmarks.sampled", record, *arguments],

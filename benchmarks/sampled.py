@@ -54,6 +54,8 @@ def phase_of(frame: FrameType | None) -> str:
     """The phase of the innermost frame that says one."""
     for each in _frames(frame):
         code = each.f_code
+        if code.co_name == "<module>" and each.f_globals["__name__"] != "__main__":
+            return "imports"
         for phase, files, functions in _PHASES:
             fits = any(file in code.co_filename for file in files)
             if fits and (not functions or code.co_name in functions):
@@ -107,7 +109,7 @@ def main(arguments: list[str]) -> int:
         sys.argv = ["savgs-ident", *command]
         run()
     except SystemExit as ended:
-        code = ended.code if isinstance(ended.code, int) else 1
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     sampler.stop()
     Path(target).write_text(json.dumps(sampler.spent))
     return code

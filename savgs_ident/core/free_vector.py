@@ -71,10 +71,17 @@ class FreeVector(eqx.Module):
             raise InputError(f"the value of parameter '{missing[0]}' is missing", remedy="give all free ones")
         inside = [move_inside(parameter, float(values[parameter.name])) for parameter in self.parameters]
         pairs = zip(self._bijections(), inside, strict=True)
-        return jnp.asarray(np.array([bijection.inverse(value) for bijection, value in pairs], float))
+        u = np.array([bijection.inverse(value) for bijection, value in pairs], float)
+        if not np.isfinite(u).all():
+            on = self.names[int(np.argmin(np.isfinite(u)))]
+            raise InputError(f"parameter '{on}' lies on its bound", remedy="choose a value inside")
+        return jnp.asarray(u)
 
     def coordinates(self, values: Float[Array, " n"]) -> Float[Array, " n"]:
-        """The vector [1] of ``values`` [SI unit of each], in the order of the names, strictly inside the bounds."""
+        """The vector [1] of ``values`` (n,) [SI unit of each], in the order of the names, strictly inside the bounds.
+
+        Unlike :meth:`to_unconstrained` it may be traced, and nothing is checked.
+        """
         return self._mapped(values, _inverse)
 
     def to_constrained(self, u: Float[Array, " n"]) -> dict[str, Float[Array, ""]]:

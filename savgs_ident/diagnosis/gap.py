@@ -112,7 +112,7 @@ def shrinks(data: Data, rows: Rows) -> tuple[Shrink, dict[str, Shrink]]:
         "after": _by_test(data, rows, (data.measured - rows.after) ** 2),
         "floor": _by_test(data, rows, data.variance * data.left_by_nuisances),
     }
-    scatter = _by_test(data, rows, 2.0 * (data.variance * data.left_by_nuisances) ** 2)
+    scatter = _by_test(data, rows, 2.0 * data.variance**2 * data.left_by_nuisances)
     present = [c for c in range(len(rows.channels)) if np.any(rows.channel == c)]
     together = _shrink(squares, power, scatter, present)
     return together, {rows.channels[c]: _shrink(squares, power, scatter, [c]) for c in present}

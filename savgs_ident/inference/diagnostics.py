@@ -242,7 +242,8 @@ def profile_of(surrogate: Surrogate, name: str) -> ProfileLine:
     free = surrogate.prior.free
     place = free.names.index(name)
     best, coordinate = surrogate_mode(surrogate), sheet_coordinate(free.parameters[place])
-    sd = float(np.linalg.norm(np.asarray(surrogate.scale)[place])) / free.widths[place]
+    along = np.asarray(surrogate.scale)[place] * np.asarray(surrogate.width)
+    sd = float(np.linalg.norm(along)) / free.widths[place]
     found = {best.values[name]: 0.0}
     for deviation in np.linspace(-SPAN, SPAN, 2 * STEPS + 1):
         value = coordinate.value(float(best.x[place]) + float(deviation) * sd)

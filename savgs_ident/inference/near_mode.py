@@ -181,7 +181,7 @@ class Curve(NamedTuple):
 
 
 def _weights(v: Array) -> Array:
-    """Of the values at seven places, (7,), in a curve through them at v: cubic convolution, whose slope is smooth."""
+    """Of the values at seven places, (7,), in a curve through them at v: cubic convolution, flat beyond its ends."""
     last = PLACES[-1] / SPACING
     # Beyond the outermost place stands its value again.
     places = jnp.arange(-last - 1.0, last + 2.0)

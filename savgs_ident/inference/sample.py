@@ -35,7 +35,7 @@ from savgs_ident.inference.diagnostics import (
     precise,
 )
 from savgs_ident.inference.likelihood import values_of
-from savgs_ident.inference.near_mode import ExactModel, Surrogate
+from savgs_ident.inference.near_mode import ExactModel, LinearisationPoint, Surrogate
 from savgs_ident.inference.posterior_mode import (
     Expansion,
     PosteriorDensity,
@@ -61,6 +61,9 @@ SAMPLERS: Mapping[Sampler, Callable[[ExactModel, Surrogate, int, Checkpoint], Ge
     "nuts": sample_by_nuts,
 }
 """Each gives chains that grow, for as long as it is asked."""
+
+_FORM = 2
+"""Of what is kept of chains: it grows when their numbers mean something else, and older ones are refused."""
 
 
 class PosedQuestion(Protocol):
@@ -147,13 +150,20 @@ def sample_posterior(
     drifting = posed.density.problem.free.identified
     located = find_mode_with_background(posed.density, mode.linearisation_point, drifting, report)
     posterior, mode = located.density, located.mode
-    expansion = expand(posterior, mode.linearisation_point, report)
-    expansion = expansion._replace(surrogate=about_draws(expansion.surrogate, settings.seed))
+    expansion = expand_about_draws(posterior, mode.linearisation_point, settings.seed, report)
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")
     answer = _Answer(posed, posterior, mode, expansion, chains, located.settled)
     return _summed_up(answer, question, settings, wall_s, describe or _nothing, origin)
+
+
+def expand_about_draws(
+    posterior: PosteriorDensity, at: LinearisationPoint, seed: int, report: Progress
+) -> Expansion:
+    """The model about a point of its posterior, as samplers take it: the surrogate about its own draws."""
+    expansion = expand(posterior, at, report)
+    return expansion._replace(surrogate=about_draws(expansion.surrogate, seed))
 
 
 def _nothing(*_: object) -> tuple[str, ...]:
@@ -177,7 +187,7 @@ def _checkpoint(
             "settings": replace(
                 settings, target_ess=0.0, time_limit_s=0.0, patience_s=0.0, predictive_draws=0
             ),
-            "version": __version__,
+            "version": (__version__, _FORM),
         }
     )
     return open_checkpoint(chain, case) if resume and chain is not None else new_checkpoint(chain, case)

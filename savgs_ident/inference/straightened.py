@@ -17,37 +17,39 @@ from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.inference.prior import NUISANCE
 
 STRAIGHT = 2.0
-"""Factor on either side of the centre within which coordinates are logarithms. Origin: by choice, no posterior that
-is normal about its mode is wider."""
+"""Factor on either side of the centre within which coordinates are logarithms. Nearer to a bound other than zero a
+parameter keeps its own coordinate, the logarithm of the distance to that. Origin: by choice, no posterior that is
+normal about its mode is wider."""
+
+
+_EDGE = log(STRAIGHT)
 
 
 class Straightened(eqx.Module):
     """Coordinates y (n + 2,) about a ``centre`` in u that are logarithms of the parameters that are positive.
 
-    Within ``lower`` and ``upper`` (n + 2,) [1], y times ``rate`` (n + 2,) is the logarithm of the value over that in
-    the centre; outside, y goes on as u does. Where nothing is straightened, the rate is 0 and y = u - centre. In the
-    centre dy / du = 1.
+    Within :data:`STRAIGHT`, y times ``rate`` (n + 2,) [1] is the logarithm of the value over that in the centre;
+    outside, y goes on as u does. Where nothing is straightened, the rate is 0 and y = u - centre. In the centre
+    dy / du = 1.
     """
 
     free: FreeVector
     centre: Float[Array, " n+2"]
     rate: Float[Array, " n+2"]
-    lower: Float[Array, " n+2"]
-    upper: Float[Array, " n+2"]
 
     def points(self, y: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
-        """The points at ``y``."""
+        """The points [free coordinates, 1] at ``y``, (n + 2,)."""
         within, beyond, _ = self._within(y)
         return jnp.where(self.rate > 0.0, self._padded(within) + beyond, self.centre + y)
 
     def slopes(self, y: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
-        """du / dy [1]."""
+        """du / dy [1], (n + 2,)."""
         return self._within(y)[2]
 
     def coordinates(self, point: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
-        """The y of a ``point``."""
+        """The y [1] of a ``point``, (n + 2,)."""
         count = point.size - len(NUISANCE)
-        edges = [self._u_at(edge) for edge in (self.lower, self.upper)]
+        edges = [self._u_at(edge * jnp.ones(point.size)) for edge in (-_EDGE, _EDGE)]
         within = jnp.clip(point[:count], *edges)
         values = jnp.stack(list(self.free.to_constrained(within).values()))
         known = self.rate[:count] > 0.0
@@ -81,7 +83,7 @@ class Straightened(eqx.Module):
     def _within(self, y: Array) -> tuple[Array, Array, Array]:
         """The u (n,) within the edges, by how much (n + 2,) it is beyond, and du / dy there."""
         asked = self.rate * y
-        logarithm = jnp.clip(asked, self.lower, self.upper)
+        logarithm = jnp.clip(asked, -_EDGE, _EDGE)
         u = self._u_at(logarithm)
         steepness = jnp.where(self.rate > 0.0, self._steepness(u), 1.0)
         return u, (asked - logarithm) / steepness, jnp.where(self.rate > 0.0, self.rate / steepness, 1.0)
@@ -96,10 +98,9 @@ def straightened_about(free: FreeVector, centre: Float[np.ndarray, " n+2"]) -> S
     u = jnp.asarray(centre[: -len(NUISANCE)])
     values = np.array([float(each) for each in free.to_constrained(u).values()])
     slopes = np.asarray(free.jacobian_diag(u))
-    rate, lower, upper = (np.zeros(centre.size) for _ in range(3))
+    rate = np.zeros(centre.size)
     for place, (each, value) in enumerate(zip(free.parameters, values, strict=True)):
-        if each.lower >= 0.0 and not each.is_typical:
+        positive = max(each.lower, 0.0) * STRAIGHT < value and value * STRAIGHT < each.upper
+        if each.lower >= 0.0 and positive and not each.is_typical:
             rate[place] = slopes[place] / value
-            lower[place] = log(max(1.0 / STRAIGHT, 0.5 * (1.0 + each.lower / value)))
-            upper[place] = log(min(STRAIGHT, 0.5 * (1.0 + each.upper / value)))
-    return Straightened(free, *(jnp.asarray(each) for each in (centre, rate, lower, upper)))
+    return Straightened(free, jnp.asarray(centre), jnp.asarray(rate))

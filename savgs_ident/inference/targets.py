@@ -17,6 +17,9 @@ from savgs_ident.inference.observations import spanned
 from savgs_ident.plants.base import Channel
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak, share_amplitudes
 
+UNSEEN = 1e-6
+"""Change [sd] of all that is compared of a test by a typical size of a state up to which nobody sees that state."""
+
 
 class HarmonicTarget(eqx.Module):
     """Complex harmonics of orders 1..n with their 2 x 2 covariances.
@@ -169,7 +172,9 @@ def _nuisances(
         changes = np.concatenate([offsets, measured.initial_states.changes[:, :, :count]], axis=-1)
     found = []
     for place, each in enumerate(whitened(whitening, changes)):
-        kept = spanned(each)
+        # A state that changes nothing has a direction all the same, that of rounding.
+        seen = np.linalg.norm(each, axis=0) > UNSEEN
+        kept = spanned(each[:, seen | (np.arange(seen.size) < channels)])
         columns = np.zeros((tests, *kept.shape))
         columns[place] = kept
         found.append(columns.reshape(tests * kept.shape[0], kept.shape[1]))

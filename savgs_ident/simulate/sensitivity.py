@@ -93,18 +93,18 @@ def harmonics_with_sensitivities(
 
     They are in the unit of the reading, and per unit of the parameter.
     """
-    seen, changes = _seen_with_changes(model, p, solution, names, orders)
-    return seen, changes
+    return _seen_with_changes(model, p, solution, names, orders)
 
 
 @eqx.filter_jit
-def _seen_with_changes(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_harmonics_and_changes, *args)
+def _seen_with_changes(*args: Any) -> tuple[Array, Array]:
+    seen, changes = run_cached(_harmonics_and_changes, *args)
+    return seen, changes
 
 
 def _harmonics_and_changes(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
-) -> tuple[Array, ...]:
+) -> tuple[Array, Array]:
     return harmonics(model, p, solution, orders), harmonic_sensitivities(model, p, solution, names, orders)
 
 

@@ -34,7 +34,6 @@ from savgs_ident.inference.likelihood import Likelihood, likelihood_of, values_o
 from savgs_ident.inference.posterior_mode import (
     Expansion,
     PosteriorDensity,
-    expand,
     find_mode,
     linearisation_point,
     with_background,
@@ -42,7 +41,7 @@ from savgs_ident.inference.posterior_mode import (
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import Task
 from savgs_ident.inference.result import Sampler
-from savgs_ident.inference.sample import SAMPLERS
+from savgs_ident.inference.sample import SAMPLERS, expand_about_draws
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 from savgs_ident.inference.targets import harmonic_target
 from savgs_ident.plants.quarter_car.model import RigModel
@@ -110,7 +109,8 @@ class Calibrator(eqx.Module):
         mode = find_mode(case, jnp.zeros(truth.size - 2), self.middle, _silent)
         if not mode.status.ok:
             return Trial(number, True, False, 0.0, {}, {})
-        return self._ranked(case, expand(case, mode.linearisation_point, _silent), number, truth)
+        expansion = expand_about_draws(case, mode.linearisation_point, 1 + number, _silent)
+        return self._ranked(case, expansion, number, truth)
 
     def _draw(self, random: np.random.Generator) -> Float[np.ndarray, " n+2"]:
         return random.standard_normal(len(self.case.problem.free.names) + 2)

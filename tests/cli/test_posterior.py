@@ -81,12 +81,15 @@ def test_the_run_converges_and_hands_over_what_it_writes(sampled: tuple[Path, Re
 
 @pytest.mark.slow
 def test_the_truth_is_not_far(sampled: tuple[Path, Result]) -> None:
-    """Within what the damper's table, a coarse print of the true curve, leaves open when all else is held."""
+    """Within what the damper's table, a coarse print of the true curve, leaves open when all else is held.
+
+    On four dwells the model's discrepancy is hardly known: the curvature at its mode is that of a narrower posterior.
+    """
     parameters = json.loads(sampled[1].stdout)["parameters"]
     assert parameters["mu_r"]["median"] == pytest.approx(TRUTH["mu_r"], rel=0.01)
     assert parameters["c_sd"]["median"] == pytest.approx(TRUTH["c_sd"], rel=0.005)
     for name in ("mu_r", "c_sd"):
-        assert parameters[name]["laplace"]["sd"] == pytest.approx(parameters[name]["sd"], rel=0.35)
+        assert 0.5 < parameters[name]["laplace"]["sd"] / parameters[name]["sd"] < 1.1
 
 
 @pytest.mark.slow

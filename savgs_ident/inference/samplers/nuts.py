@@ -1,8 +1,8 @@
 """NUTS on the surrogate, corrected by the exact model.
 
 A gradient of the exact model costs as much as forty responses; one of the surrogate s costs next to nothing, and in
-its coordinates t the posterior is nearly a unit normal (the Laplace approximation is the preconditioner). A step of a
-chain therefore is
+its coordinates t the posterior is nearly a unit normal (the Laplace approximation and draws of s are the
+preconditioner). A step of a chain therefore is
 
 1. from the chain's present state x, :data:`TRANSITIONS` transitions of NUTS (blackjax) on s, which lead to y;
 2. the exact density pi at y, and y is accepted with probability min(1, w(y) / w(x)), w = pi / s; otherwise the chain
@@ -219,7 +219,7 @@ def _transitions(*args: Any) -> tuple[Array, ...]:
 
 
 def _adapt(surrogate: Surrogate, key: Array) -> tuple[Array, ...]:
-    """The step size by dual averaging, on one chain from the mode."""
+    """The step size by dual averaging, on one chain from the middle of the draws."""
     blackjax = _blackjax()
     start, update, final = blackjax.adaptation.step_size.dual_averaging_adaptation(ACCEPTANCE)
     kernel = blackjax.nuts.build_kernel()
