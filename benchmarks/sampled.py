@@ -54,7 +54,7 @@ def phase_of(frame: FrameType | None) -> str:
     """The phase of the innermost frame that says one."""
     for each in _frames(frame):
         code = each.f_code
-        if code.co_name == "<module>" and each.f_globals["__name__"] != "__main__":
+        if code.co_name == "<module>" and each.f_globals.get("__name__") != "__main__":
             return "imports"
         for phase, files, functions in _PHASES:
             fits = any(file in code.co_filename for file in files)
