@@ -34,15 +34,10 @@ from savgs_ident.inference.diagnostics import (
     others_mixed,
     precise,
 )
+from savgs_ident.inference.expansion import Expansion, expand
 from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.near_mode import ExactModel, LinearisationPoint, Surrogate
-from savgs_ident.inference.posterior_mode import (
-    Expansion,
-    PosteriorDensity,
-    PosteriorMode,
-    expand,
-    find_mode_with_background,
-)
+from savgs_ident.inference.posterior_mode import PosteriorDensity, PosteriorMode, find_mode_with_background
 from savgs_ident.inference.result import Marginal, Posterior, Sampler
 from savgs_ident.inference.samplers.chains import (
     Chains,

@@ -28,11 +28,11 @@ from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about
 from savgs_ident.inference.diagnostics import least_ess, mixing_of, names_by_role
+from savgs_ident.inference.expansion import Expansion
 from savgs_ident.inference.harmonic_model import SampledHarmonics
 from savgs_ident.inference.harmonic_question import Question, plan
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of, values_of
 from savgs_ident.inference.posterior_mode import (
-    Expansion,
     PosteriorDensity,
     find_mode,
     linearisation_point,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.inference.expansion import LONGEST, nuisance_scale, parameter_scale
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,
@@ -16,7 +17,6 @@ from savgs_ident.inference.laplace import (
     precision_of,
 )
 from savgs_ident.inference.observations import Data
-from savgs_ident.inference.posterior_mode import LONGEST, nuisance_scale, parameter_scale
 from savgs_ident.inference.prior import Prior, Scales, sheet_coordinate
 
 from .toy import FIXED_SCALES, FREE, straight_toy

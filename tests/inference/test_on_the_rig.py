@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.inference.expansion import Expansion, expand
 from savgs_ident.inference.harmonic_question import Question, density_of, locate, plan
-from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, PosteriorMode, expand, find_mode
+from savgs_ident.inference.posterior_mode import PosteriorDensity, PosteriorMode, find_mode
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel

@@ -7,7 +7,7 @@ import pytest
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.inference.diagnostics import R_HAT, least_ess, mixing_of
-from savgs_ident.inference.posterior_mode import Expansion
+from savgs_ident.inference.expansion import Expansion
 from savgs_ident.inference.sample import SAMPLERS, _run
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.inference.expansion import linear_surrogate
 from savgs_ident.inference.near_mode import SHAPES, LinearisationPoint, bend_of
-from savgs_ident.inference.posterior_mode import linear_surrogate
 
 from .toy import Toy, bent_toy
 from .toy_surrogate import Stand, density_of, mode_of, stand_for

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from savgs_ident.inference.expansion import linear_surrogate
 from savgs_ident.inference.near_mode import Surrogate, bend_of, triangular_map_of
-from savgs_ident.inference.posterior_mode import LinearisationPoint, PosteriorDensity, linear_surrogate
+from savgs_ident.inference.posterior_mode import LinearisationPoint, PosteriorDensity
 from savgs_ident.inference.prior import Prior
 
 from .toy import Toy
