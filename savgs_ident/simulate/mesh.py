@@ -185,6 +185,15 @@ def uniform_mesh(layout: Layout) -> Mesh:
     return _stack(layout, [2.0 * np.pi * np.arange(count) / count for count in layout.counts])
 
 
+def places_between(old: Mesh, new: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Where the nodes of one mesh lie among those of another: the node before each, (P,), and the share of its step."""
+    # All dwells at a time: each has a turn of its own.
+    known, wanted = (2.0 * np.pi * each.layout.dwell + np.asarray(each.phase) for each in (old, new))
+    first, count = old.layout.starts[new.layout.dwell], np.asarray(old.layout.counts)[new.layout.dwell]
+    before = np.clip(np.searchsorted(known, wanted, side="right") - 1, first, first + count - 1)
+    return before, (wanted - known[before]) / np.asarray(old.gap)[before]
+
+
 def adapted_mesh(
     mesh: Mesh, accelerations: NDArray[np.float64], frequency: NDArray[np.float64], layout: Layout
 ) -> Mesh:
@@ -195,13 +204,17 @@ def adapted_mesh(
     """
     rates = np.abs(accelerations[:, mesh.layout.following] - accelerations)
     width = np.minimum(_SMOOTHING, _SMOOTHING_TIME * frequency)
-    rows = []
-    for dwell, count in enumerate(layout.counts):
-        mine = mesh.layout.dwell == dwell
-        totals = np.maximum(rates[:, mine].sum(axis=1, keepdims=True), np.finfo(float).tiny)
-        share = (rates[:, mine] / totals).mean(axis=0)
-        rows.append(_nodes_of_dwell(np.asarray(mesh.phase)[mine], share, width[dwell], count))
-    return _stack(layout, rows)
+    starts = mesh.layout.starts
+    totals = np.maximum(np.add.reduceat(rates, starts, axis=1), np.finfo(float).tiny)
+    share = (rates / totals[:, mesh.layout.dwell]).mean(axis=0)
+    parts = zip(
+        np.split(np.asarray(mesh.phase), starts[1:]),
+        np.split(share, starts[1:]),
+        width,
+        layout.counts,
+        strict=True,
+    )
+    return _stack(layout, [_nodes_of_dwell(*each) for each in parts])
 
 
 def _nodes_of_dwell(phase: np.ndarray, share: np.ndarray, width: float, nodes: int) -> np.ndarray:

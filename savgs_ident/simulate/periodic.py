@@ -52,6 +52,7 @@ from savgs_ident.simulate.mesh import (
     layout_for,
     only_dwells,
     over_dwells,
+    places_between,
     uniform_mesh,
 )
 from savgs_ident.simulate.program_cache import placed, run_cached
@@ -338,14 +339,12 @@ def _resting(
 def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
     """A trajectory known on old nodes, at new ones, by linear interpolation."""
 
-    def moved(values: np.ndarray) -> np.ndarray:
-        out = np.empty((values.shape[0], new.layout.total))
-        for dwell in range(len(new.layout.counts)):
-            here, there = old.layout.dwell == dwell, new.layout.dwell == dwell
-            for row in range(values.shape[0]):
-                phase, wanted = np.asarray(old.phase)[here], np.asarray(new.phase)[there]
-                out[row, there] = np.interp(wanted, phase, values[row, here], period=2.0 * np.pi)
-        return out
+    before, share = places_between(old, new)
+    after = old.layout.following[before]
+
+    def moved(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        left = values[:, before]
+        return left + share * (values[:, after] - left)
 
     return Trajectory(*(jnp.asarray(moved(np.asarray(part))) for part in trajectory))
 
