@@ -10,7 +10,7 @@ _CSV = (
     "recordings.csv.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_head._cells",
 )  # fmt: skip
 _JSON_MCAP = (
-    "recordings.mcap_records.JsonDecoder._parse", "recordings.mcap_records._schema_units",
+    "recordings.mcap_json.JsonDecoder._parse", "recordings.mcap_json._schema_units",
     "recordings.mcap_timing._from_json", "recordings.mcap_records.McapRecords._decompress",
 )  # fmt: skip
 _CDR_MCAP = (

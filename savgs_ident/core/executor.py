@@ -38,7 +38,7 @@ from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from savgs_ident.core.errors import InputError
 
@@ -405,6 +405,19 @@ def in_parallel(work: Callable[[Item], Result], items: Iterable[Item]) -> list[R
     """Apply ``work`` to every item on all cores; results in the order of the items."""
     with ThreadPoolExecutor(cores()) as pool:
         return list(pool.map(work, items))
+
+
+def one_ahead(items: Iterable[Item]) -> Iterator[Item]:
+    """The items, each made in another thread while the one before it is worked on.
+
+    What making one raises is raised where it is asked for.
+    """
+    iterator, end = iter(items), object()
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(next, iterator, end)
+        while (item := begun.result()) is not end:
+            begun = pool.submit(next, iterator, end)
+            yield cast(Item, item)
 
 
 def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:

@@ -11,8 +11,9 @@ decoder, its bindings, its growing columns. At the end each topic gets its clock
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from mcap.records import Channel as McapChannel
@@ -20,6 +21,7 @@ from mcap.records import Schema
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.executor import one_ahead
 from savgs_ident.recordings.cdr import CdrDecoder
 from savgs_ident.recordings.channels import (
     AbsentSignalError,
@@ -32,10 +34,10 @@ from savgs_ident.recordings.channels import (
     ambiguous,
     bind,
 )
+from savgs_ident.recordings.mcap_json import JsonDecoder
 from savgs_ident.recordings.mcap_records import (
     MAGIC,
     DecodeError,
-    JsonDecoder,
     McapRecords,
     MessageBlock,
     Segment,
@@ -61,7 +63,7 @@ from savgs_ident.recordings.recording import (
 def read_mcap(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
     """Read one MCAP file; raises :class:`InputError` where nothing in it can be used."""
     records = McapRecords(path, progress)
-    return reading_of_segments(path, records, records.warnings, channel_map)
+    return reading_of_segments(path, one_ahead(records), records.warnings, channel_map)
 
 
 def reading_of_segments(
@@ -367,11 +369,12 @@ def _split_tests(
     if not spans:
         start = min(int(time.min()) for time in times)
         spans = (Span(path.stem, start, None, None),)
+    placed = [_samples_of(spans, time) for time in times]
     recordings = []
-    for span in spans:
+    for number, span in enumerate(spans):
         channels: dict[str, RecordedChannel] = {}
-        for data, time in zip(topics, times, strict=True):
-            channels |= _channels_within(span, data, time, channel_map.layout)
+        for data, mine in zip(topics, placed, strict=True):
+            channels |= _channels_of(data, mine[number], channel_map.layout)
         kind, named = classify_test(span.name)
         frequency = span.frequency_hz if span.frequency_hz is not None else named
         kind = "dwell" if kind == "other" and frequency is not None else kind
@@ -380,24 +383,55 @@ def _split_tests(
     return tuple(recordings), tuple(warnings)
 
 
-def _channels_within(
-    span: Span, data: TopicData, time: NDArray[np.int64], layout: RecordingLayout
-) -> dict[str, RecordedChannel]:
+class _Samples(NamedTuple):
+    """Places of the samples of a test in their topic, and their time from its start [s], (n,)."""
+
+    where: slice | NDArray[np.intp]
+    time: NDArray[np.float64]
+
+
+def _samples_of(spans: Sequence[Span], time: NDArray[np.int64]) -> list[_Samples]:
+    """The samples of each test, by their ``time`` [ns], which is not to be used any more.
+
+    Seconds of tests one after the other stand where the nanoseconds stood: an hour of both would take twice as long
+    a column.
+    """
+    places = [_places_within(span, time) for span in spans]
+    ends = [(each.start, each.stop) for each in places if isinstance(each, slice)]
+    apart = len(ends) == len(places) and all(
+        before[1] <= after[0] for before, after in pairwise(sorted(ends))
+    )
+    seconds = time.view(np.float64) if apart else np.empty(0)
+    found = []
+    for span, where in zip(spans, places, strict=True):
+        since = 1e-9 * (time[where] - span.start).astype(np.float64)
+        if apart:
+            seconds[where] = since
+            since = seconds[where]
+        found.append(_Samples(where, since))
+    return found
+
+
+def _places_within(span: Span, time: NDArray[np.int64]) -> slice | NDArray[np.intp]:
     inside = time >= span.start
     if span.stop is not None:
         inside &= time <= span.stop
     picked = np.flatnonzero(inside)
     if picked.size == 0:
-        return {}
+        return slice(0, 0)
     whole = slice(int(picked[0]), int(picked[-1]) + 1)
-    contiguous = whole.stop - whole.start == picked.size
-    clock = 1e-9 * (time[whole if contiguous else picked] - span.start).astype(np.float64)
+    return whole if whole.stop - whole.start == picked.size else picked
+
+
+def _channels_of(data: TopicData, samples: _Samples, layout: RecordingLayout) -> dict[str, RecordedChannel]:
+    if not samples.time.size:
+        return {}
     return {
         binding.channel: RecordedChannel(
             binding.channel,
             layout.si_unit(binding.channel),
-            clock,
-            data.values[binding.channel][whole if contiguous else picked],
+            samples.time,
+            data.values[binding.channel][samples.where],
             binding.label,
         )
         for binding in data.bindings

@@ -5,18 +5,15 @@ files that end too early, are read the same way. Chunks are decompressed one at 
 than they declare. A :class:`Segment` holds the records of a chunk; :func:`message_block` addresses the messages
 of one topic in it, and :func:`gather` reads the same field of all of them at once.
 
-JSON messages of one topic become numbers a block at a time: a block is parsed by one call, which is what makes it
-fast. Those of ROS 2 are decoded in :mod:`savgs_ident.recordings.cdr`.
+Messages in JSON are decoded in :mod:`savgs_ident.recordings.mcap_json`, those of ROS 2 in
+:mod:`savgs_ident.recordings.cdr`.
 """
 
-import json
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
-from itertools import chain
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -31,8 +28,7 @@ from mcap.records import Schema
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError, SavgsIdentError
-from savgs_ident.recordings.channels import Progress, SignalCandidate
-from savgs_ident.recordings.units import find_unit
+from savgs_ident.recordings.channels import Progress
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK = 1 << 27
@@ -40,7 +36,17 @@ LARGEST_CHUNK = 1 << 27
 _HEAD = struct.Struct("<BQ")
 _RECORD = struct.Struct("<BQH")
 _CHUNK = struct.Struct("<QQQII")
-_LENGTH_AT, _LOG_TIME_AT, _PUBLISH_TIME_AT = 1, 15, 23
+_LOG_TIME_AT = 15
+_MESSAGE_FIELDS = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log", "<i8"),
+        ("publish", "<i8"),
+    ]
+)
 _LOG_TIME = struct.Struct("<Q")
 _MESSAGE_HEAD = 22
 """Bytes of a message record's content before its payload: channel, sequence, log and publish time."""
@@ -101,8 +107,9 @@ class McapRecords:
                 self._ends_early = True
                 break
             if opcode == Opcode.CHUNK:
-                yield bytes(loose)
-                loose.clear()
+                if loose:
+                    yield bytes(loose)
+                    loose.clear()
                 yield self._unpack_chunk(stream.read(length))
                 self.progress(stream.tell() / size)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
@@ -263,137 +270,8 @@ def gather(data: bytes, positions: NDArray[np.int64], code: str) -> NDArray[Any]
 
 def message_block(data: bytes, records: NDArray[np.int64]) -> MessageBlock:
     """The messages whose records begin at ``records`` (n,) in ``data``."""
-    length = gather(data, records + _LENGTH_AT, "<u8").astype(np.int64)
-    log = gather(data, records + _LOG_TIME_AT, "<i8").astype(np.int64)
-    publish = gather(data, records + _PUBLISH_TIME_AT, "<i8").astype(np.int64)
+    heads = np.frombuffer(data, dtype=np.uint8)[records[:, None] + np.arange(_HEAD.size + _MESSAGE_HEAD)]
+    fields = heads.view(_MESSAGE_FIELDS)[:, 0]
     starts = records + _HEAD.size + _MESSAGE_HEAD
-    return MessageBlock(data, starts, starts + length - _MESSAGE_HEAD, log, publish)
-
-
-_DEEPEST = 4
-
-_STAMPS = (
-    ("header", "stamp", "sec", "nanosec"),
-    ("header", "stamp", "sec", "nsec"),
-    ("timestamp", "sec", "nsec"),
-)
-
-_JSON_ERRORS = (ValueError, RecursionError)
-
-
-class JsonDecoder:
-    """Decoder of one topic. The description of a property in the schema is its unit where it is one."""
-
-    def __init__(self, topic: str, schema: bytes) -> None:
-        self.topic = topic
-        self.notes: tuple[DataWarning, ...] = ()
-        self._units = _schema_units(schema)
-
-    def candidates(self, first: bytes) -> tuple[SignalCandidate, ...]:
-        """The numbers in the first message as signals, nested ones by their dotted path."""
-        message = self._parse([first])[0]
-        return tuple(
-            SignalCandidate(path, path, self._units.get(path), f"{self.topic} {path}")
-            for path, _ in _numbers(message, "", 0)
-        )
-
-    def find(self, field: str, first: bytes) -> str | None:
-        """The path that the map's ``field`` means, or None."""
-        return field if field in {path for path, _ in _numbers(self._parse([first])[0], "", 0)} else None
-
-    def decode(
-        self, block: MessageBlock, keys: Sequence[str]
-    ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64] | None]:
-        """The numbers at ``keys``, each (n,), NaN where a message lacks one, and stamps [ns] if any."""
-        messages = self._parse([block.payload(index) for index in range(block.log.size)])
-        table = _flat_table(messages, keys)
-        if table is None:
-            return {key: _column(messages, tuple(key.split(".")), key) for key in keys}, _stamps(messages)
-        return dict(zip(keys, table.T, strict=True)), _stamps(messages)
-
-    def _parse(self, texts: list[bytes]) -> list[dict[str, Any]]:
-        try:
-            messages: list[dict[str, Any]] = json.loads(b"[" + b",".join(texts) + b"]")
-        except _JSON_ERRORS:
-            messages = []
-        if len(messages) == len(texts) and all(type(message) is dict for message in messages):
-            return messages
-        for index, text in enumerate(texts):
-            try:
-                good = type(json.loads(text)) is dict
-            except _JSON_ERRORS:
-                good = False
-            if not good:
-                shown = text[:60].decode("utf-8", errors="replace")
-                raise DecodeError(f"a message is not a JSON object: {shown!r}", index)
-        return [json.loads(text) for text in texts]
-
-
-def _flat_table(messages: list[dict[str, Any]], keys: Sequence[str]) -> NDArray[np.float64] | None:
-    """The fields of all messages at once, (n, keys); None unless each is a plain number at top level."""
-    try:
-        # One key more than needed: with a single key itemgetter would not give a tuple.
-        rows = list(map(itemgetter(*keys, keys[0]), messages))
-    except KeyError:
-        return None
-    if not set(map(type, chain.from_iterable(rows))) <= {float, int}:
-        return None
-    try:
-        return np.array(rows, dtype=np.float64)[:, : len(keys)]
-    except OverflowError:
-        return None
-
-
-def _column(messages: list[dict[str, Any]], path: tuple[str, ...], key: str) -> NDArray[np.float64]:
-    """One field of every message; bool and text are not numbers, null and absence are missing samples."""
-    found = [message.get(path[0]) for message in messages]
-    for name in path[1:]:
-        found = [part.get(name) if type(part) is dict else None for part in found]
-    kinds = set(map(type, found)) - {float, int, type(None)}
-    if kinds:
-        index = next(i for i, value in enumerate(found) if type(value) in kinds)
-        raise DecodeError(f"'{key}' is {found[index]!r:.60}, not a number", index)
-    try:
-        return np.array(found, dtype=np.float64)
-    except OverflowError as error:
-        raise DecodeError(f"'{key}' has a number too large to hold") from error
-
-
-def _stamps(messages: list[dict[str, Any]]) -> NDArray[np.int64] | None:
-    """Header stamps [ns] if every message has one in one of the usual places."""
-    for *place, sec, nanosec in _STAMPS:
-        if place[0] not in messages[0]:
-            continue
-        parts: list[Any] = messages
-        for name in place:
-            parts = [part.get(name) if type(part) is dict else None for part in parts]
-        if not all(
-            type(part) is dict and type(part.get(sec)) is int and type(part.get(nanosec)) is int
-            for part in parts
-        ):
-            continue
-        try:
-            return np.array([part[sec] * 1_000_000_000 + part[nanosec] for part in parts], dtype=np.int64)
-        except OverflowError:
-            return None
-    return None
-
-
-def _numbers(value: object, path: str, depth: int) -> Iterator[tuple[str, float]]:
-    if depth > _DEEPEST:
-        return
-    if isinstance(value, dict):
-        for name, part in value.items():
-            yield from _numbers(part, f"{path}.{name}" if path else name, depth + 1)
-    elif path and (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):
-        yield path, float("nan") if value is None else 0.0
-
-
-def _schema_units(schema: bytes) -> dict[str, str]:
-    """Unit of each top-level property, from ``unit`` or from a description that is nothing but a unit."""
-    try:
-        properties = json.loads(schema)["properties"]
-        pairs = [(name, entry.get("unit") or entry.get("description")) for name, entry in properties.items()]
-    except (*_JSON_ERRORS, KeyError, TypeError, AttributeError):
-        return {}
-    return {name: text for name, text in pairs if isinstance(text, str) and find_unit(text)}
+    stops = starts + fields["length"].astype(np.int64) - _MESSAGE_HEAD
+    return MessageBlock(data, starts, stops, fields["log"].copy(), fields["publish"].copy())

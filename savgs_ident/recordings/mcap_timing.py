@@ -107,8 +107,10 @@ def _clock_warning(name: str, spread: dict[str, float], topic: str, source: str)
 
 def _on_log_scale(time: NDArray[np.int64], log: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """A clock of another epoch moved by the smallest delay seen; 0 where it has the same epoch."""
+    if time is log:
+        return time, 0
     delay = log - time
-    if time is log or abs(int(np.median(delay))) < _SAME_EPOCH_NS:
+    if abs(int(np.median(delay))) < _SAME_EPOCH_NS:
         return time, 0
     offset = int(delay.min())
     return time + offset, offset

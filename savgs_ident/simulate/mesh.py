@@ -186,7 +186,7 @@ def uniform_mesh(layout: Layout) -> Mesh:
 
 
 def places_between(old: Mesh, new: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Where the nodes of one mesh lie among those of another: the node before each, (P,), and the share of its step."""
+    """Where the nodes of one mesh lie among those of another: the node before, (P,), and the share of its step."""
     # All dwells at a time: each has a turn of its own.
     known, wanted = (2.0 * np.pi * each.layout.dwell + np.asarray(each.phase) for each in (old, new))
     first, count = old.layout.starts[new.layout.dwell], np.asarray(old.layout.counts)[new.layout.dwell]

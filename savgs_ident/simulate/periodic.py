@@ -338,7 +338,6 @@ def _resting(
 
 def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
     """A trajectory known on old nodes, at new ones, by linear interpolation."""
-
     before, share = places_between(old, new)
     after = old.layout.following[before]
 

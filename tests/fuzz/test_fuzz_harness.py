@@ -2,6 +2,7 @@
 
 import ast
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
@@ -135,10 +136,12 @@ def _called(work: Callable[[], object]) -> set[str]:
             found.add(f"{module.removeprefix('savgs_ident.')}.{frame.f_code.co_qualname}")
 
     sys.setprofile(note)
+    threading.setprofile(note)
     try:
         work()
     finally:
         sys.setprofile(None)
+        threading.setprofile(None)
     return found
 
 
