@@ -420,6 +420,14 @@ def one_ahead(items: Iterable[Item]) -> Iterator[Item]:
             yield cast(Item, item)
 
 
+@contextmanager
+def beside(work: Callable[[], object]) -> Iterator[None]:
+    """Have ``work`` done in another thread meanwhile; the end waits for it, and what it raises is not raised."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(work)
+        yield
+
+
 def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
     """Run two functions at the same time and return both results."""
     with ThreadPoolExecutor(1) as pool:

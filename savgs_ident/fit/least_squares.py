@@ -10,8 +10,9 @@ with the small errors that every model has (:mod:`savgs_ident.fit.small_errors`)
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import beside
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
@@ -36,7 +38,9 @@ from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
+from savgs_ident.inference.background import imposed
 from savgs_ident.inference.laplace import spread_of
+from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.inference.targets import HarmonicTarget, Target
 from savgs_ident.plants.at_rest import require_return
@@ -46,10 +50,14 @@ from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
+    blank_solution,
+    layout_of,
     simulate_periodic,
     solve_on_mesh,
 )
+from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.readings import harmonics
+from savgs_ident.simulate.sensitivity import rehearse_sensitivities
 
 
 @dataclass(frozen=True)
@@ -219,25 +227,21 @@ def fit_least_squares(
     task = plan_task(measured, model, free, settings.problem)
     problem = task.problem
 
-    report("solving the model as given")
-    first = _as_given(task, motion)
-    if not any(each.ok for each in first.status()):
-        require_return(problem.model, problem.fixed)
-    as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
-    report("preparing the fit")
     minimiser = Minimiser(problem)
-    first_u, *others = _starts(task, settings.starts, values) if begin is None else [begin]
-    if begin is not None or values:
-        p = problem.parameters(first_u)
-        first = simulate_periodic(problem.model, p, task.excitation, settings.periodic)
-    tried = [minimiser.minimise(first_u, first, settings.steps, report, enough=ROUGHLY)]
-    for u in others:
-        if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:
-            break
-        report("trying another start")
-        tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), report))
-    report("refining on nodes adapted to the result")
-    best = _best_refined(task, minimiser, tried, settings.steps, report)
+    with beside(partial(_rehearse, task)):
+        report("solving the model as given")
+        first = _as_given(task, motion)
+        if not any(each.ok for each in first.status()):
+            require_return(problem.model, problem.fixed)
+        as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
+        report("preparing the fit")
+        starts = _starts(task, settings.starts, values) if begin is None else [begin]
+        if begin is not None or values:
+            p = problem.parameters(starts[0])
+            first = simulate_periodic(problem.model, p, task.excitation, settings.periodic)
+        tried = _tried(task, minimiser, starts, first, settings.steps, report)
+        report("refining on nodes adapted to the result")
+        best = _best_refined(task, minimiser, tried, settings.steps, report)
     with_errors = fit_with_errors(task, minimiser, best, report)
     if isinstance(with_errors, FitWithErrors):
         best, information, own = with_errors.best, with_errors.information, with_errors.own
@@ -250,6 +254,35 @@ def fit_least_squares(
     verdict = assess(task, minimiser, best._replace(jacobian=information), explained, report)
     wall_s = time.perf_counter() - began
     return assemble_fit(task, Outcome(as_given, tuple(tried), best, covariance, own, verdict, wall_s), origin)
+
+
+def _rehearse(task: Task) -> None:
+    """Have compiled, or read from the cache, what comes after the model is solved."""
+    problem, target = task.problem, task.problem.target
+    layout = layout_of(task.excitation, task.settings.periodic, problem.model)
+    blank = blank_solution(problem.model, task.excitation, layout)
+    p, orders = placed(dict(problem.fixed)), problem.orders
+    rehearse_sensitivities(problem.model, p, blank, problem.free.names, orders)
+    if isinstance(target, HarmonicTarget):
+        imposed.rehearse(problem.model, likelihood_of(target), orders, p, blank)
+
+
+def _tried(
+    task: Task,
+    minimiser: Minimiser,
+    starts: Sequence[Array],
+    first: PeriodicSolution,
+    steps: int,
+    report: Progress,
+) -> list[Minimum]:
+    """Minima from the starts, until one explains the data; the motions at the first start are ``first``."""
+    tried = [minimiser.minimise(starts[0], first, steps, report, enough=ROUGHLY)]
+    for u in starts[1:]:
+        if tried[0].status.ok and tried[0].cost < EXPLAINED * task.problem.target.entries:
+            break
+        report("trying another start")
+        tried.append(_from_start(task, minimiser, u, min(EXPLORING, steps), report))
+    return tried
 
 
 def _as_given(task: Task, motion: PeriodicSolution | None) -> PeriodicSolution:

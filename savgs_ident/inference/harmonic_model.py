@@ -26,7 +26,7 @@ from savgs_ident.inference.observations import Data
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution, adapt, resolve, solve_near
-from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
 from savgs_ident.simulate.readings import harmonics_of
 from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities, trajectory_sensitivities
 
@@ -70,7 +70,9 @@ class ExactHarmonics(eqx.Module):
 
     def responses(self, us: Float[np.ndarray, "W n"]) -> Responses:
         """The model at several sets of free coordinates, on as many cores as there are."""
-        found = in_parallel(lambda u: _response(self.problem, self.anchor, placed(jnp.asarray(u))), us)
+        found = in_parallel(
+            lambda u: first_alone(_response, self.problem, self.anchor, placed(jnp.asarray(u))), us
+        )
         harmonics = np.stack([np.asarray(each[0]) for each in found])
         step = np.array([float(each[1]) for each in found])
         return Responses(harmonics, (step <= ENOUGH) & np.isfinite(harmonics).all(axis=(1, 2, 3)))

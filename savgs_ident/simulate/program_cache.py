@@ -22,19 +22,21 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
 import numpy as np
 from jax import export
 from jaxtyping import Array
+
+Value = TypeVar("Value")
 
 _PACKAGE = "savgs_ident"
 _TRACERS = ("jax", "jaxlib", "equinox", "numpy", "scipy")
@@ -183,6 +185,21 @@ def done_once(what: Hashable, work: Callable[[], object]) -> None:
         if what not in _DONE:
             work()
             _DONE.add(what)
+
+
+def first_alone(program: Callable[..., Value], *args: Any) -> Value:
+    """``program(*args)``; the first time for arguments of these shapes, threads that ask for it meanwhile wait."""
+    key = program, signature(args)
+    with _WORKING.setdefault(key, threading.Lock()) if key not in _DONE else nullcontext():
+        found = program(*args)
+    _DONE.add(key)
+    return found
+
+
+def signature(tree: Any) -> Hashable:
+    """What a program is compiled for: the structure of its arguments, the shapes of arrays, and all else as it is."""
+    leaves, structure = jax.tree.flatten(tree)
+    return structure, tuple((each.shape, each.dtype) if eqx.is_array(each) else each for each in leaves)
 
 
 def placed(tree: Any) -> Any:

@@ -16,6 +16,7 @@ from savgs_ident.simulate.collocation import Trajectory, node_motion
 from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.mesh import Mesh, waves
 from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.program_cache import placed
 
 Share = Callable[[Array, Array, Array], Array]
 """With what share an instant counts, from its phase and those where the comparison begins and ends."""
@@ -70,14 +71,22 @@ def analyse(
     return twice * (seen[..., : orders + 1] + 1j * seen[..., orders + 1 :])
 
 
-@eqx.filter_jit
 def harmonics(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
 ) -> Complex[Array, "D C K"]:
     """Complex harmonics 0..orders of the sensor readings, (D, C, orders + 1), in the channels' SI units.
 
-    Channels are those of the plant, in its order.
+    Channels are those of the plant, in its order. A program of its own; for parts of another there is
+    :func:`harmonics_of`.
     """
+    p, solution = placed((dict(p), solution))
+    return _harmonics(model, p, solution, orders)
+
+
+@eqx.filter_jit
+def _harmonics(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
     return harmonics_of(model, p, solution.trajectory, solution, orders)
 
 

@@ -30,8 +30,8 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.program_cache import run_cached
-from savgs_ident.simulate.readings import Sensors, harmonics, harmonics_of, readings_of, sensors_of, shown_by
+from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
+from savgs_ident.simulate.readings import Sensors, harmonics_of, readings_of, sensors_of, shown_by
 
 
 class Directions(NamedTuple):
@@ -74,26 +74,37 @@ def unit_tangents(p: Values, names: Sequence[str], count: int) -> dict[str, NDAr
     return tangents
 
 
-@eqx.filter_jit
 def harmonic_sensitivities(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str], orders: int
 ) -> Complex[Array, "n D C K"]:
     """Derivatives of the harmonics 0..orders of the sensor readings in the named parameters.
 
     They are in the unit of the reading per unit of the parameter.
     """
-    tangents = jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names)))
-    return directional(model, p, solution, orders, directions_of(model, p, tangents, len(names)))
+    return harmonics_with_sensitivities(model, p, solution, names, orders)[1]
 
 
 def harmonics_with_sensitivities(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str], orders: int
 ) -> tuple[Complex[Array, "D C K"], Complex[Array, "n D C K"]]:
     """Harmonics 0..orders of the sensor readings, and their derivatives, by one program for all that asks for them.
 
     They are in the unit of the reading, and per unit of the parameter.
     """
-    return _seen_with_changes(model, p, solution, names, orders)
+    p, solution = placed((dict(p), solution))
+    order = sorted(p)
+    places = placed(jnp.asarray(np.array([order.index(name) for name in names], np.int64)))
+    wanted = placed(jnp.asarray(len(names)))
+    return first_alone(_seen_with_changes, model, p, solution, places, wanted, orders)
+
+
+def rehearse_sensitivities(
+    model: AbstractPlant, p: Values, blank: PeriodicSolution, names: Sequence[str], orders: int
+) -> None:
+    """Have the program of these compiled, on a :func:`blank_solution`: nothing is computed."""
+    p, blank = placed((dict(p), blank))
+    places, nothing = placed((jnp.zeros(len(names), int), jnp.asarray(0)))
+    first_alone(_seen_with_changes, model, p, blank, places, nothing, orders)
 
 
 @eqx.filter_jit
@@ -103,17 +114,18 @@ def _seen_with_changes(*args: Any) -> tuple[Array, Array]:
 
 
 def _harmonics_and_changes(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, places: Array, wanted: Array, orders: int
 ) -> tuple[Array, Array]:
-    return harmonics(model, p, solution, orders), harmonic_sensitivities(model, p, solution, names, orders)
+    """Harmonics, and their derivatives in the parameters of these ``places`` among their sorted names, (w,).
 
-
-def directional(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int, directions: Directions
-) -> Complex[Array, "k D C K"]:
-    """The same along k directions of the parameters."""
+    Only the first ``wanted`` of them are.
+    """
+    tangents = {name: 1.0 * (places == place) for place, name in enumerate(sorted(p))}
+    directions = directions_of(model, p, tangents, places.size)._replace(wanted=wanted)
     seen, changes = seen_along(model, p, solution, orders, directions)
-    return shown_along(seen, changes, directions.wanted, solution.excitation.part, solution.mesh)
+    part, mesh = solution.excitation.part, solution.mesh
+    shown = shown_along(seen, changes, directions.wanted, part, mesh)
+    return shown_by(seen.sensors, seen.readings, part, mesh), shown
 
 
 class Seen(NamedTuple):

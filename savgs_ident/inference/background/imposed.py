@@ -23,7 +23,7 @@ from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.responses.harmonic_response import ComparedPart
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
 from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
 from savgs_ident.simulate.sensitivity import (
     TOGETHER,
@@ -100,7 +100,8 @@ def _shown(
     """Changes of the rows, (k, m), by the arrays of what is seen and of its changes."""
     half = len(flat) // 2
     seen, changes = (Seen(readings, Sensors(*sensors)) for readings, *sensors in (flat[:half], flat[half:]))
-    (rows,) = _rows_along(likelihood, seen, changes, wanted, solution.excitation.part, solution.mesh)
+    part, mesh = solution.excitation.part, solution.mesh
+    (rows,) = first_alone(_rows_along, likelihood, seen, changes, wanted, part, mesh)
     return np.asarray(rows)
 
 
@@ -159,13 +160,24 @@ def impose(
             stacked[number, :, : 1 if values.ndim == 1 else 2] = values.reshape(nodes, -1)
         imposed = placed((jnp.asarray(places), jnp.asarray(stacked)))
         wanted = placed(jnp.asarray(len(some)))
-        flat = _answered(model, placed(dict(p)), solution, imposed, wanted, orders)
+        flat = first_alone(_answered, model, placed(dict(p)), solution, imposed, wanted, orders)
         return _shown(likelihood, flat, wanted, solution)[: len(some)]
 
-    # The first alone: two at a time would compile the same program twice.
-    first, others = range(0, len(signals), batch)[:1], range(batch, len(signals), batch)
-    found = [*map(rows_of_some, first), *in_parallel(rows_of_some, others)]
+    found = in_parallel(rows_of_some, range(0, len(signals), batch))
     return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
+
+
+def rehearse(
+    model: AbstractPlant, likelihood: Likelihood, orders: int, p: Values, blank: PeriodicSolution
+) -> None:
+    """Have compiled what gives answers to imposed signals and what ports see, on a :func:`blank_solution`."""
+    nodes = blank.mesh.layout.total
+    batch = _batch(nodes)
+    imposed = placed((jnp.zeros(batch, int), jnp.zeros((batch, nodes, 2))))
+    nothing = placed(jnp.asarray(0))
+    flat = first_alone(_answered, model, placed(dict(p)), blank, imposed, nothing, orders)
+    _shown(likelihood, flat, nothing, blank)
+    node_loads(model, p, blank)
 
 
 @eqx.filter_jit
