@@ -8,30 +8,21 @@ about it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from arviz_stats.base.array import array_stats
 from emcee.autocorr import integrated_time
-from jaxtyping import Array, Float
-from numpy.typing import NDArray
+from jaxtyping import Float
 from scipy.special import logsumexp, ndtri
 
 from savgs_ident.core.free_vector import FreeVector
-from savgs_ident.core.status import Status
-from savgs_ident.inference.find_map import find_map
-from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import values_of
-from savgs_ident.inference.near_mode import Surrogate
-from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.posterior_mode import PosteriorDensity
-from savgs_ident.inference.prior import NUISANCE, Coordinates, sheet_coordinate
-from savgs_ident.inference.result import Convergence, Marginal, ProfileLine, Role
+from savgs_ident.inference.prior import NUISANCE
+from savgs_ident.inference.result import Convergence, Marginal, Role
 from savgs_ident.inference.samplers.chains import Chains
+from savgs_ident.inference.surrogate_shape import Shape
 
 LEAST_DRAWS = 8
 """Steps of a chain below which nothing can be said."""
@@ -184,83 +175,10 @@ def _autocorrelation(draws: Float[np.ndarray, "S C"]) -> float:
         return float(integrated_time(draws[:, :, None], tol=0, quiet=True)[0])
 
 
-SPAN = 3.0
-"""How far profiles reach to either side [standard deviations]."""
-
-STEPS = 6
-"""Points of a profile to either side."""
-
-SURROGATE_STEPS = 60
-SURROGATE_LEVEL = 1e-5
-
-
-@dataclass(frozen=True)
-class SurrogatePlant:
-    """A surrogate, as the search for a mode asks for it: nothing has to be solved, and it is solved everywhere."""
-
-    surrogate: Surrogate
-
-    @property
-    def nuisances(self) -> Coordinates:
-        """The free parameters."""
-        return tuple(sheet_coordinate(parameter) for parameter in self.surrogate.prior.free.parameters)
-
-    def predict(
-        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: None
-    ) -> Prediction:
-        """Rows at ``values`` [SI] with their slopes. There are no ``terms``."""
-        surrogate, free = self.surrogate, self.surrogate.prior.free
-        u = np.asarray(free.to_unconstrained(values))
-        axes = np.asarray(surrogate.scale)[: u.size, : u.size]
-        y, along = (np.asarray(each) for each in _straightened(surrogate, jnp.asarray(u)))
-        v = np.linalg.solve(axes, y)
-        rows, slopes = (np.asarray(each) for each in _rows_and_slopes(surrogate, jnp.asarray(v)))
-        by_value = np.linalg.solve(axes.T, slopes.T).T / along
-        return Prediction(rows, lambda: by_value, Status.CONVERGED, None)
-
-    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: None) -> None:
-        """Nothing is started from nearby. Values are in SI."""
-        return
-
-    def sensitivities(
-        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
-    ) -> list[NDArray[np.float64]]:
-        """Nothing may be added."""
-        return []
-
-
-def surrogate_mode(surrogate: Surrogate, held: Mapping[str, float] | None = None) -> LaplaceFit:
-    """Where a surrogate is highest, with the parameters ``held`` [SI] where they are said to be."""
-    free, size = surrogate.prior.free, len(surrogate.prior.free.names)
-    centre = {name: float(value) for name, value in free.to_constrained(surrogate.centre[:size]).items()}
-    search = search_of(SurrogatePlant(surrogate), surrogate.likelihood.data)
-    return find_map(search, (), centre, None, SURROGATE_STEPS, SURROGATE_LEVEL, held)
-
-
-def profile_of(surrogate: Surrogate, name: str) -> ProfileLine:
-    """The profile of a parameter; a point at which the search failed is left out."""
-    free = surrogate.prior.free
-    place = free.names.index(name)
-    best, coordinate = surrogate_mode(surrogate), sheet_coordinate(free.parameters[place])
-    along = np.asarray(surrogate.scale)[place] * np.asarray(surrogate.width)
-    sd = float(np.linalg.norm(along)) / free.widths[place]
-    found = {best.values[name]: 0.0}
-    for deviation in np.linspace(-SPAN, SPAN, 2 * STEPS + 1):
-        value = coordinate.value(float(best.x[place]) + float(deviation) * sd)
-        held = surrogate_mode(surrogate, {name: value}) if deviation else best
-        if held.status.ok:
-            found[value] = 2.0 * (best.value - held.value)
-    values = np.array(sorted(found))
-    return ProfileLine(values, np.array([found[each] for each in values]))
-
-
 _ABOUT = {
     "noise_scale": "factor on the measured noise",
     "discrepancy": "size of the small errors of the model, relative to the response or the force",
 }
-
-_STEP = 1e-5
-"""Step of a coordinate for the slope of a value."""
 
 
 def names_by_role(free: FreeVector) -> dict[str, Role]:
@@ -272,18 +190,12 @@ def names_by_role(free: FreeVector) -> dict[str, Role]:
 
 
 def marginals_of(
-    posterior: PosteriorDensity, surrogate: Surrogate, chains: Chains, mixing: Mapping[str, Mixing]
+    posterior: PosteriorDensity, shape: Shape, chains: Chains, mixing: Mapping[str, Mixing]
 ) -> tuple[Marginal, ...]:
     """The marginal of every parameter, identified ones with their profiles."""
     free, scales = posterior.problem.free, posterior.likelihood.scales
     draws = values_of(free, scales, chains.points)
     low, high = (_prior_values(posterior, share) for share in (0.025, 0.975))
-    top = surrogate_mode(surrogate)
-    point = np.concatenate(
-        [top.x * free.widths, scales.coordinates(top.noise_scales.noise, top.noise_scales.discrepancy)]
-    )
-    mode = values_of(free, scales, point[None])
-    laplace = _laplace_sd(posterior, surrogate, point)
     about = {each.name: (each.unit, each.about) for each in free.parameters}
     about |= {name: ("1", text) for name, text in _ABOUT.items()}
     found = []
@@ -302,10 +214,10 @@ def marginals_of(
                 q975=float(q975),
                 prior=(low[name], high[name]),
                 contraction=float(1.0 - (q975 - q025) / (high[name] - low[name])),
-                laplace_value=float(mode[name][0]),
-                laplace_sd=laplace[name],
+                laplace_value=shape.values[name],
+                laplace_sd=shape.sd[name],
                 **mixing[name]._asdict(),
-                profile=profile_of(surrogate, name) if role == "identified" else None,
+                profile=shape.profiles.get(name),
             )
         )
     return tuple(found)
@@ -321,48 +233,3 @@ def _prior_values(posterior: PosteriorDensity, share: float) -> dict[str, float]
         name: float(value[0])
         for name, value in values_of(posterior.problem.free, posterior.likelihood.scales, point[None]).items()
     }
-
-
-def _laplace_sd(
-    posterior: PosteriorDensity, surrogate: Surrogate, point: Float[np.ndarray, " n+2"]
-) -> dict[str, float]:
-    """Standard deviations from the curvature at the surrogate's highest point, each in its unit."""
-    # Where no discrepancy is best, beside the symmetry plane: the magnitude has no second derivative there.
-    point = np.append(point[:-1], max(point[-1], _STEP))
-    t = jnp.asarray(surrogate.coordinates(point[None])[0])
-    information, slopes = -np.asarray(_hessian(surrogate, t)), np.asarray(_point_slopes(surrogate, t))
-    sizes, axes = np.linalg.eigh(information)
-    spread = slopes @ (axes / np.sqrt(np.where(sizes > 0.0, sizes, np.nan)))
-    deviation = np.sqrt(np.sum(spread**2, axis=1))
-    found = {}
-    for place, name in enumerate((*posterior.problem.free.names, *NUISANCE)):
-        # Away from zero, where the discrepancy, a magnitude, has a kink.
-        step = np.copysign(_STEP, point[place]) * np.eye(1, point.size, place)
-        moved = values_of(
-            posterior.problem.free, posterior.likelihood.scales, np.concatenate([point[None], point + step])
-        )
-        found[name] = float(abs(np.diff(moved[name])[0]) / _STEP * deviation[place])
-    return found
-
-
-@eqx.filter_jit
-def _straightened(surrogate: Surrogate, u: Array) -> tuple[Array, Array]:
-    """Straightened coordinates of ``u`` (n,), and d value / dy there [SI unit of each value], (n,) each."""
-    y = surrogate.straightened.coordinates(jnp.append(u, surrogate.centre[u.size :]))
-    slopes = surrogate.straightened.slopes(y)[: u.size] * surrogate.prior.free.jacobian_diag(u)
-    return y[: u.size], slopes
-
-
-@eqx.filter_jit
-def _rows_and_slopes(surrogate: Surrogate, v: Array) -> tuple[Array, Array]:
-    return surrogate.rows_at(v), jax.jacfwd(surrogate.rows_at)(v)
-
-
-@eqx.filter_jit
-def _hessian(surrogate: Surrogate, t: Array) -> Array:
-    return jax.hessian(surrogate.of_point)(t)
-
-
-@eqx.filter_jit
-def _point_slopes(surrogate: Surrogate, t: Array) -> Array:
-    return jax.jacfwd(surrogate.point)(t)

@@ -25,7 +25,8 @@ from savgs_ident.inference.near_mode import LinearisationPoint, LinearRows
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.periodic import PeriodicSolution, adapt, resolve, solve_near
+from savgs_ident.simulate.nearby import solve_near
+from savgs_ident.simulate.periodic import PeriodicSolution, adapt, resolve
 from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
 from savgs_ident.simulate.readings import harmonics_of
 from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities, trajectory_sensitivities
@@ -33,6 +34,9 @@ from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities, traje
 ENOUGH = 1e-4
 """Last relative Newton step at which a motion near the anchor counts as solved; what is left is far smaller, and that
 is a hundredth of what the noise hides."""
+
+CLOSELY = 1e-6
+"""What is left of a motion, relative to its size, at which steps by the anchor's linearisation end."""
 
 LIMIT = 30
 """Most Newton steps; two or three are the rule."""
@@ -175,7 +179,7 @@ def _response(*args: Any) -> tuple[Array, ...]:
 
 def _harmonics_near(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, Array]:
     p, known = problem.parameters(u), anchor.solution
-    motions, step = solve_near(problem.model, p, known, anchor.predicted(u), LIMIT, ENOUGH)
+    motions, step = solve_near(problem.model, p, known, anchor.predicted(u), LIMIT, ENOUGH, CLOSELY)
     return harmonics_of(problem.model, p, motions, known, problem.orders), step
 
 

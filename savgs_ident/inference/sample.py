@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.inference.diagnostics import (
     assess_convergence,
@@ -49,6 +50,7 @@ from savgs_ident.inference.samplers.chains import (
 )
 from savgs_ident.inference.samplers.emcee import about_draws, sample_by_emcee
 from savgs_ident.inference.samplers.nuts import sample_by_nuts
+from savgs_ident.inference.surrogate_shape import Shape, shape_of
 from savgs_ident.plants.model import Model
 
 SAMPLERS: Mapping[Sampler, Callable[[ExactModel, Surrogate, int, Checkpoint], Generator[Chains]]] = {
@@ -117,6 +119,7 @@ class _Answer(NamedTuple):
     posterior: PosteriorDensity
     mode: PosteriorMode
     expansion: Expansion
+    shape: Shape
     chains: Chains
     settled: bool
 
@@ -146,10 +149,13 @@ def sample_posterior(
     located = find_mode_with_background(posed.density, mode.linearisation_point, drifting, report)
     posterior, mode = located.density, located.mode
     expansion = expand_about_draws(posterior, mode.linearisation_point, settings.seed, report)
-    chains = _run(expansion, settings, checkpoint, began, report)
+    chains, shape = side_by_side(
+        lambda: _run(expansion, settings, checkpoint, began, report),
+        lambda: shape_of(posterior, expansion.surrogate),
+    )
     wall_s = time.perf_counter() - began
     report("summing up")
-    answer = _Answer(posed, posterior, mode, expansion, chains, located.settled)
+    answer = _Answer(posed, posterior, mode, expansion, shape, chains, located.settled)
     return _summed_up(answer, question, settings, wall_s, describe or _nothing, origin)
 
 
@@ -236,7 +242,7 @@ def _summed_up(
     doubts = [] if status.ok else [f"the mode was not found: {status.advice}"]
     doubts += [] if answer.settled else [UNSETTLED]
     convergence = assess_convergence(chains, identified, others, settings.target_ess, doubts)
-    marginals = marginals_of(posterior, answer.expansion.surrogate, chains, mixing)
+    marginals = marginals_of(posterior, answer.shape, chains, mixing)
     draws = {name: values[name].T for name in roles}
     medians = {each.name: each.median for each in marginals if each.role != "nuisance"}
     table = question.model.table

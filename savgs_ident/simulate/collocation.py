@@ -36,7 +36,7 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import AbstractPlant, Motion
-from savgs_ident.simulate.mesh import CHUNK, Layout
+from savgs_ident.simulate.mesh import CHUNK, Layout, NodeOrder
 
 Matrices = Float[Array, "m k P"]
 Vectors = Float[Array, "m P"]
@@ -93,17 +93,17 @@ def by_chunks(array: Float[Array, "*k P"]) -> Float[Array, "L *k C"]:
     return jnp.moveaxis(array.reshape(*array.shape[:-1], -1, CHUNK), -1, 0)
 
 
-def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> Float[Array, "most *k D"]:
+def _over_chunks(layout: NodeOrder, array: Float[Array, "*k C"], absent: Array) -> Float[Array, "most *k D"]:
     padded = jnp.concatenate([array, absent[..., None]], axis=-1)
     return jnp.moveaxis(padded[..., layout.chunk_table], -1, 0)
 
 
-def _opened(layout: Layout, values: Float[Array, "*k P"]) -> Float[Array, "*k P"]:
+def _opened(layout: NodeOrder, values: Float[Array, "*k P"]) -> Float[Array, "*k P"]:
     """Nothing leads from the last node of a window that begins with a given state to its first."""
-    return values.at[..., layout.loose_ends].set(0.0) if layout.opened else values
+    return values if layout.loose is None else jnp.where(layout.loose, 0.0, values)
 
 
-def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
+def factorise_recurrence(layout: NodeOrder, steps: Float[Array, "m m P"]) -> CyclicFactors:
     """Factorise the recurrence with step matrices M_n [units of the states per those of the states]."""
 
     def compose(matrices: Array) -> Array:
@@ -120,7 +120,7 @@ def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> Cyclic
 
 
 def solve_recurrence(
-    layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]
+    layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]
 ) -> Float[Array, "m P"]:
     """The periodic x_n for right sides d_n, which belong to the step from node n to the next.
 
@@ -129,7 +129,9 @@ def solve_recurrence(
     return _solve_opened(layout, factors, _opened(layout, right))
 
 
-def _solve_opened(layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]) -> Float[Array, "m P"]:
+def _solve_opened(
+    layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]
+) -> Float[Array, "m P"]:
     """The same, where what stands at the last node of a window that does not close is how it begins."""
 
     def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
@@ -148,8 +150,8 @@ def _solve_opened(layout: Layout, factors: CyclicFactors, right: Float[Array, "m
     period_side, _ = jax.lax.scan(end, jnp.zeros_like(over[1][0]), over)
     start = jnp.einsum("dij,jd->id", factors.closing, period_side)
     _, starts = jax.lax.scan(pass_on, start, over)
-    present = layout.chunk_table < factors.chunks.shape[-1]
-    _, nodes = jax.lax.scan(pass_on, jnp.moveaxis(starts, 0, -1)[:, present], inside)
+    begins = jnp.moveaxis(starts, 0, -1).reshape(size, -1)[:, layout.chunk_place]
+    _, nodes = jax.lax.scan(pass_on, begins, inside)
     return jnp.moveaxis(nodes, 0, -1).reshape(right.shape)
 
 
@@ -177,9 +179,9 @@ class Linearised(NamedTuple):
     factors: CyclicFactors
 
 
-def blank_linearised(model: AbstractPlant, layout: Layout) -> Linearised:
+def blank_linearised(model: AbstractPlant, layout: NodeOrder) -> Linearised:
     """Zeros of the shapes that :func:`linearise` gives."""
-    n, nodes, dwells = len(model.coordinates), layout.total, len(layout.counts)
+    n, nodes, dwells = len(model.coordinates), layout.dwell.size, len(layout.chunk_table)
     inner = n + len(model.states)
     size = n + inner
     return Linearised(
@@ -247,7 +249,7 @@ def linearise(
     prepared: Any,
     at: Trajectory,
     u: Any,
-    layout: Layout,
+    layout: NodeOrder,
     steps: Float[Array, " P"],
 ) -> Linearised:
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
@@ -282,7 +284,7 @@ def _inverse_of_step(share: Float[Array, "m 1 P"], slope: Float[Array, "k m P"],
 
 
 def step_defects(
-    model: AbstractPlant, at: Trajectory, rate: Nodes, layout: Layout, steps: Float[Array, " P"]
+    model: AbstractPlant, at: Trajectory, rate: Nodes, layout: NodeOrder, steps: Float[Array, " P"]
 ) -> Nodes:
     """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``, in SI; ``steps`` [s]."""
     weight = implicitness(model)
@@ -290,7 +292,7 @@ def step_defects(
     return at.x - at.x[:, layout.following] + step
 
 
-def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
+def solve_linearised(layout: NodeOrder, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
     """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes, all in SI."""
     dx = apply_nodes(lin.inverse, solve_recurrence(layout, lin.factors, defects))
     return Trajectory(dx, imbalance + apply_nodes(lin.slope, dx))

@@ -14,7 +14,7 @@ them; chunks of equal length are what the linear algebra runs over in parallel.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +24,34 @@ from numpy.typing import NDArray
 
 CHUNK = 16
 """Nodes in a chunk."""
+
+
+class NodeOrder(Protocol):
+    """Which of P nodes follows which, and to which of D dwells it belongs: of a layout, or of a part of it."""
+
+    @property
+    def dwell(self) -> NDArray[np.intp] | Array:
+        """Dwell of each node, (P,)."""
+
+    @property
+    def following(self) -> NDArray[np.intp] | Array:
+        """The next node of the same dwell, cyclically, (P,)."""
+
+    @property
+    def preceding(self) -> NDArray[np.intp] | Array:
+        """The node before, cyclically, (P,)."""
+
+    @property
+    def chunk_table(self) -> NDArray[np.intp] | Array:
+        """Chunks of each dwell in order, (D, most); absent ones point behind the last chunk."""
+
+    @property
+    def chunk_place(self) -> NDArray[np.intp] | Array:
+        """Where each chunk stands in that table, its rows one after the other, (chunks,)."""
+
+    @property
+    def loose(self) -> NDArray[np.bool_] | Array | None:
+        """Whether a node leads to no other, (P,); None where all lead to one."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +100,15 @@ class Layout:
         before[self.starts] = self.starts + np.asarray(self.counts) - 1
         return before
 
+    @cached_property
+    def loose(self) -> NDArray[np.bool_] | None:
+        """Whether a node is the last one of a window that begins with a given state, (P,); None without such."""
+        if not self.opened:
+            return None
+        found = np.zeros(self.total, np.bool_)
+        found[self.loose_ends] = True
+        return found
+
     @property
     def loose_ends(self) -> NDArray[np.intp]:
         """The last nodes of the windows that begin with a given state."""
@@ -90,6 +127,11 @@ class Layout:
         place = np.arange(chunks.max())[None, :]
         return np.where(place < chunks[:, None], first[:, None] + place, chunks.sum())
 
+    @cached_property
+    def chunk_place(self) -> NDArray[np.intp]:
+        """Where each chunk stands in :attr:`chunk_table`, its rows one after the other, (chunks,)."""
+        return np.flatnonzero(self.chunk_table < self.total // CHUNK)
+
 
 def layout_for(frequency: NDArray[np.float64], nodes: int, slow: float) -> Layout:
     """``nodes`` per period, more in proportion to the period below the frequency ``slow`` [Hz].
@@ -100,10 +142,10 @@ def layout_for(frequency: NDArray[np.float64], nodes: int, slow: float) -> Layou
     return Layout(tuple(int(count) for count in CHUNK * np.ceil(wanted / CHUNK)))
 
 
-def over_dwells(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
+def over_dwells(values: Float[Array, " P"], layout: NodeOrder) -> Float[Array, " D"]:
     """The largest value in each dwell, in its unit; infinite where one is NaN."""
     finite = jnp.where(jnp.isnan(values), jnp.inf, values)
-    return jax.ops.segment_max(finite, layout.dwell, len(layout.counts), indices_are_sorted=True)
+    return jax.ops.segment_max(finite, layout.dwell, len(layout.chunk_table), indices_are_sorted=True)
 
 
 SPREAD = 0.5

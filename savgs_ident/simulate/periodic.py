@@ -48,6 +48,7 @@ from savgs_ident.simulate.mesh import (
     CHUNK,
     Layout,
     Mesh,
+    NodeOrder,
     adapted_mesh,
     layout_for,
     only_dwells,
@@ -92,17 +93,17 @@ class _Progress(NamedTuple):
     share: Float[Array, " D"]
 
 
-def _rates(model: AbstractPlant, at: Trajectory) -> Array:
-    """xd = (qd, y), (m, P), in SI per second."""
+def node_rates(model: AbstractPlant, at: Trajectory, imbalance: Float[Array, "k P"]) -> Float[Array, "m P"]:
+    """xd = (qd, y + imbalance), in SI per second."""
     n = len(model.coordinates)
-    return jnp.concatenate([at.x[n : 2 * n], at.y])
+    return jnp.concatenate([at.x[n : 2 * n], at.y + imbalance])
 
 
 def _newton_step(
-    model: AbstractPlant, p: Values, prepared: Any, at: Trajectory, u: Any, layout: Layout, steps: Array
+    model: AbstractPlant, p: Values, prepared: Any, at: Trajectory, u: Any, layout: NodeOrder, steps: Array
 ) -> tuple[Trajectory, Linearised]:
     lin = linearise(model, p, prepared, at, u, layout, steps)
-    rate = _rates(model, at).at[len(model.coordinates) :].add(lin.imbalance)
+    rate = node_rates(model, at, lin.imbalance)
     return solve_linearised(layout, lin, step_defects(model, at, rate, layout, steps), lin.imbalance), lin
 
 
@@ -112,7 +113,7 @@ def solve_newton(
     prepared: Any,
     start: Trajectory,
     u: Any,
-    layout: Layout,
+    layout: NodeOrder,
     steps: Float[Array, " P"],
     scale: Float[Array, "m P"],
     limit: Int[Array, ""],
@@ -131,7 +132,9 @@ def solve_newton(
         change, lin = _newton_step(model, p, prepared, at, u, layout, steps)
         relative = jnp.abs(change.x) / scale
         length, moved = (
-            over_dwells(jnp.max(each, axis=0), layout) for each in (relative, relative[:coordinates])
+            # No node at all may belong to a dwell of a part of a layout.
+            jnp.maximum(over_dwells(jnp.max(each, axis=0), layout), 0.0)
+            for each in (relative, relative[:coordinates])
         )
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))
@@ -144,7 +147,7 @@ def solve_newton(
         return jnp.any(step > enough) & jnp.all(jnp.isfinite(step)) & (progress.result.iterations < limit)
 
     blank = blank_linearised(model, layout)
-    far = jnp.full(len(layout.counts), np.finfo(np.float64).max)
+    far = jnp.full(len(layout.chunk_table), np.finfo(np.float64).max)
     begin = _Progress(NewtonResult(start, blank, far, jnp.zeros((), int)), jnp.ones_like(far))
     return jax.lax.while_loop(unfinished, advance, begin).result
 
@@ -248,20 +251,6 @@ def _solve(
     u = model.drive(signals, turning)
     result = solve_newton(model, p, prepared, start, u, layout, steps, scale, limit, enough)
     return tuple(jax.tree.leaves(result))
-
-
-def solve_near(
-    model: AbstractPlant, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
-) -> tuple[Trajectory, Float[Array, ""]]:
-    """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step [1].
-
-    To be a part of a larger program that is compiled. Look at the step: it is above ``enough`` where ``limit``
-    iterations were too few.
-    """
-    bounds = jnp.asarray(limit), jnp.asarray(enough)
-    parts = _solve(model, p, model.prepare(p), known.excitation, known.mesh, start, *bounds)
-    found = jax.tree.unflatten(newton_structure(), parts)
-    return found.trajectory, jnp.max(found.last_step)
 
 
 def blank_solution(model: AbstractPlant, excitation: Excitation, layout: Layout) -> PeriodicSolution:

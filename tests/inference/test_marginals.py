@@ -14,6 +14,7 @@ from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.prior import NUISANCE
 from savgs_ident.inference.result import Marginal
 from savgs_ident.inference.samplers.chains import Chains
+from savgs_ident.inference.surrogate_shape import shape_of
 
 from .toy import FIXED_SCALES, FREE, PARAMETERS, Toy, straight_toy
 from .toy_surrogate import density_of, mode_of, normal_covariance, stand_for
@@ -33,7 +34,8 @@ def _marginals(toy: Toy) -> Mapping[str, Marginal]:
     chains = _normal_chains(toy, stand.point)
     draws = values_of(FREE, toy.likelihood.scales, chains.points)
     mixing = {name: mixing_of(each) for name, each in draws.items()}
-    return {each.name: each for each in marginals_of(stand.posterior, stand.surrogate, chains, mixing)}
+    shape = shape_of(stand.posterior, stand.surrogate)
+    return {each.name: each for each in marginals_of(stand.posterior, shape, chains, mixing)}
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.inference.diagnostics import SPAN, STEPS, profile_of
+from savgs_ident.inference.surrogate_shape import SPAN, STEPS, profile_of, surrogate_mode
 
 from .toy import FIXED_SCALES, straight_toy
 from .toy_surrogate import mode_of, normal_covariance, stand_for
@@ -32,7 +32,8 @@ SCALE = {"gain": 2.0, "offset": 1.0, "spring": 1.6e3}
 def test_the_rise_is_the_square_of_the_deviation(name: str) -> None:
     # Data so strong that all priors are flat.
     toy = straight_toy(FREE, FIXED_SCALES, strength=300.0)
-    line = profile_of(stand_for(toy).surrogate, name)
+    surrogate = stand_for(toy).surrogate
+    line = profile_of(surrogate, name, surrogate_mode(surrogate))
     place = FREE.names.index(name)
     scale = SCALE[name]
     mode = FREE.parameters[place].value + scale * mode_of(toy)[place]

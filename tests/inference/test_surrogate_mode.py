@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from savgs_ident.inference.diagnostics import surrogate_mode
 from savgs_ident.inference.prior import sheet_coordinate
+from savgs_ident.inference.surrogate_shape import surrogate_mode
 
 from .toy import FREE, Toy, straight_toy
 from .toy_surrogate import Stand, mode_of, stand_for
@@ -30,7 +30,7 @@ def test_with_a_parameter_held_the_others_make_the_best_of_it(bent: Toy, rough: 
     best = surrogate_mode(rough.surrogate)
     level = float(best.x[place]) + 0.3 / free.widths[place]
     value = sheet_coordinate(free.parameters[place]).value(level)
-    held = surrogate_mode(rough.surrogate, {"damping": value})
+    held = surrogate_mode(rough.surrogate, best.values, {"damping": value})
     assert held.status.ok
     assert held.x[place] == pytest.approx(level, abs=1e-9)
     assert held.value < best.value - 0.1
