@@ -32,7 +32,7 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.inference.problem import Evaluation, Linearised, Pins, Problem, evaluate, evaluate_beside
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.program_cache import compiled_quickly, placed
 
 TOLERANCE = 1e-2
 """Change of coordinates and of what the optimiser is given at which it stops by itself."""
@@ -78,7 +78,7 @@ def _affine(u: Array, at: Linearised) -> tuple[Array, None]:
     return SHARPNESS * (at.residual + at.jacobian @ (u - at.u)), None
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _step(solver: Any, u: Array, at: Linearised, state: Any) -> tuple[Any, ...]:
     u, state, _ = solver.step(_affine, u, at, {}, state, frozenset())
     done, result = solver.terminate(_affine, u, at, {}, state, frozenset())

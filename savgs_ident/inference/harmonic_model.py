@@ -27,7 +27,7 @@ from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.nearby import solve_near
 from savgs_ident.simulate.periodic import PeriodicSolution, adapt, resolve
-from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
+from savgs_ident.simulate.program_cache import compiled_quickly, first_alone, placed, run_cached
 from savgs_ident.simulate.readings import harmonics_of
 from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities, trajectory_sensitivities
 
@@ -36,7 +36,11 @@ ENOUGH = 1e-4
 is a hundredth of what the noise hides."""
 
 CLOSELY = 1e-6
-"""What is left of a motion, relative to its size, at which steps by the anchor's linearisation end."""
+"""What is left of a motion, relative to its size, as steps by the anchor's linearisation show it, at which they end.
+
+Where friction sticks at another instant there is up to a hundred times as much: with what :data:`ENOUGH` leaves, log
+densities of the posterior of the rig are off by 0.007 (standard deviation), and by less than 0.03.
+"""
 
 LIMIT = 30
 """Most Newton steps; two or three are the rule."""
@@ -153,7 +157,7 @@ class SampledHarmonics(NamedTuple):
         return ExactHarmonics(self.problem, likelihood, anchor_at(self.problem, u, warm_start))
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _rows_and_slopes(
     free: FreeVector, likelihood: Likelihood, u: Array, predicted: Array, by_name: Array
 ) -> tuple[Array, Array]:

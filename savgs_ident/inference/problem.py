@@ -28,7 +28,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve
-from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.program_cache import compiled_quickly, placed
 from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonics_with_sensitivities
 
@@ -163,7 +163,7 @@ def _evaluation(problem: Problem, pins: Pins, u: Array, p: Values, solution: Per
     return Evaluation(Linearised(u, residual, jacobian), solution)
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _residual_and_jacobian(
     free: FreeVector, target: Target, pins: Pins, u: Array, predicted: Array, by_name: Array
 ) -> tuple[Array, Array]:

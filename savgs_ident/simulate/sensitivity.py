@@ -30,7 +30,7 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.program_cache import first_alone, placed, run_cached
+from savgs_ident.simulate.program_cache import compiled_quickly, first_alone, placed, run_cached
 from savgs_ident.simulate.readings import Sensors, harmonics_of, readings_of, sensors_of, shown_by
 
 
@@ -95,16 +95,42 @@ def harmonics_with_sensitivities(
     order = sorted(p)
     places = placed(jnp.asarray(np.array([order.index(name) for name in names], np.int64)))
     wanted = placed(jnp.asarray(len(names)))
-    return first_alone(_seen_with_changes, model, p, solution, places, wanted, orders)
+    return _by_places(model, p, solution, places, wanted, orders)
 
 
 def rehearse_sensitivities(
     model: AbstractPlant, p: Values, blank: PeriodicSolution, names: Sequence[str], orders: int
 ) -> None:
-    """Have the program of these compiled, on a :func:`blank_solution`: nothing is computed."""
+    """Have the programs of these compiled, on a :func:`blank_solution`: nothing is computed of the motion."""
     p, blank = placed((dict(p), blank))
     places, nothing = placed((jnp.zeros(len(names), int), jnp.asarray(0)))
-    first_alone(_seen_with_changes, model, p, blank, places, nothing, orders)
+    _by_places(model, p, blank, places, nothing, orders)
+
+
+def _by_places(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, places: Array, wanted: Array, orders: int
+) -> tuple[Array, Array]:
+    """Harmonics, and their derivatives in the first ``wanted`` of the parameters at ``places`` among sorted names."""
+    prepared = placed(model.prepare(p))
+    # Apart from what moves: of few numbers, so it need not be compiled with care.
+    flat = first_alone(_changes_of_prepared, model, p, places)
+    changes = jax.tree.unflatten(jax.tree.structure(prepared), flat)
+    return first_alone(_seen_with_changes, model, p, solution, places, wanted, prepared, changes, orders)
+
+
+@compiled_quickly
+def _changes_of_prepared(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_flat_changes, *args)
+
+
+def _flat_changes(model: AbstractPlant, p: Values, places: Array) -> tuple[Array, ...]:
+    """Changes of what a plant prepares from its parameters, by each of those at ``places``, (w, ...) each."""
+    changes = directions_of(model, p, _unit_tangents_at(p, places), places.size).changes
+    return tuple(jax.tree.leaves(changes))
+
+
+def _unit_tangents_at(p: Values, places: Array) -> dict[str, Array]:
+    return {name: 1.0 * (places == place) for place, name in enumerate(sorted(p))}
 
 
 @eqx.filter_jit
@@ -114,14 +140,16 @@ def _seen_with_changes(*args: Any) -> tuple[Array, Array]:
 
 
 def _harmonics_and_changes(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, places: Array, wanted: Array, orders: int
+    model: AbstractPlant,
+    p: Values,
+    solution: PeriodicSolution,
+    places: Array,
+    wanted: Array,
+    prepared: Any,
+    changes: Any,
+    orders: int,
 ) -> tuple[Array, Array]:
-    """Harmonics, and their derivatives in the parameters of these ``places`` among their sorted names, (w,).
-
-    Only the first ``wanted`` of them are.
-    """
-    tangents = {name: 1.0 * (places == place) for place, name in enumerate(sorted(p))}
-    directions = directions_of(model, p, tangents, places.size)._replace(wanted=wanted)
+    directions = Directions(_unit_tangents_at(p, places), prepared, changes, wanted)
     seen, changes = seen_along(model, p, solution, orders, directions)
     part, mesh = solution.excitation.part, solution.mesh
     shown = shown_along(seen, changes, directions.wanted, part, mesh)

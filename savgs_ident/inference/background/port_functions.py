@@ -30,6 +30,7 @@ from savgs_ident.effects.learned_functions import (
 )
 from savgs_ident.inference.background.constants import BackgroundConstants
 from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.program_cache import compiled_quickly
 
 Signal = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -255,7 +256,7 @@ def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
 
 
 # Compiled as a whole, as all of these functions are.
-@eqx.filter_jit
+@compiled_quickly
 def _filters(omega: Any) -> list[Any]:
     return filters(omega)
 
@@ -312,7 +313,7 @@ def motion_functions(
 
 
 # Compiled as a whole: a program for each operation would take seconds to load.
-@eqx.filter_jit
+@compiled_quickly
 def _values_of(functions: Any, x: Any, d: Any, v: Any, n: Any, held: Any) -> Any:
     return values_of(functions, RelativeMotion(x, d, v, n, held=[jnp.asarray(each) for each in held]))
 
