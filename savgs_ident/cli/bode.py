@@ -47,7 +47,7 @@ def bode(
     reporter = Reporter(json, quiet)
     prepare_folder(out)
     shown = identified_model(plant, model)
-    with reporter.working() as progress:
+    with reporter.drawing() as progress:
         compared = si.compare(shown, read_recorded(campaign, channels, progress, shown), orders, progress)
         files = compared.save(out, progress)
     return reporter.conclude(compared, files)

@@ -30,6 +30,7 @@ from rich.console import Console, RenderableType
 from rich.status import Status
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.executor import beside
 from savgs_ident.report.text import plain
 
 if TYPE_CHECKING:
@@ -127,6 +128,16 @@ class Reporter:
                 yield Progress(console, status)
         else:
             yield Progress(console, None)
+
+    @contextmanager
+    def drawing(self) -> Iterator[Progress]:
+        """The same for work that ends in pictures: what draws them is loaded meanwhile."""
+        with beside(_load_pictures), self.working() as progress:
+            yield progress
+
+
+def _load_pictures() -> None:
+    import savgs_ident.report.theme  # noqa: F401
 
 
 def print_error(message: str) -> None:

@@ -75,7 +75,7 @@ def diagnose(
     reporter = Reporter(json, quiet)
     prepare_folder(out)
     baseline = baseline_model(plant, rig, model, beside or ())
-    with reporter.working() as progress:
+    with reporter.drawing() as progress:
         found = si.diagnose(
             baseline,
             read_recorded(campaign, channels, progress, baseline),

@@ -77,7 +77,7 @@ def fit(
     reporter = Reporter(json, quiet)
     prepare_folder(out)
     start = model_to_fit(plant, rig, model, beside or ())
-    with reporter.working() as progress:
+    with reporter.drawing() as progress:
         found = si.fit(
             start,
             read_recorded(campaign, channels, progress, start),

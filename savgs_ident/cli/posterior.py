@@ -83,7 +83,7 @@ def posterior(
     identified = identified_model(plant, model)
     chain = out / f"chain-{sampler.value}.h5"
     try:
-        with reporter.working() as progress:
+        with reporter.drawing() as progress:
             found = si.sample(
                 identified,
                 read_recorded(campaign, channels, progress, identified),
