@@ -407,7 +407,7 @@ def in_parallel(work: Callable[[Item], Result], items: Iterable[Item]) -> list[R
         return list(pool.map(work, items))
 
 
-def one_ahead(items: Iterable[Item]) -> Iterator[Item]:
+def one_ahead(items: Iterable[Item]) -> Generator[Item]:
     """The items, each made in another thread while the one before it is worked on.
 
     What making one raises is raised where it is asked for.

@@ -43,7 +43,7 @@ densities of the posterior of the rig are off by 0.007 (standard deviation), and
 """
 
 LIMIT = 30
-"""Most Newton steps; two or three are the rule."""
+"""Most Newton steps of a group of tests, where there need to be any; two or three are the rule."""
 
 
 class Anchor(eqx.Module):

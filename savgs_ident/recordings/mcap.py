@@ -10,6 +10,7 @@ decoder, its bindings, its growing columns. At the end each topic gets its clock
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -63,7 +64,8 @@ from savgs_ident.recordings.recording import (
 def read_mcap(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
     """Read one MCAP file; raises :class:`InputError` where nothing in it can be used."""
     records = McapRecords(path, progress)
-    return reading_of_segments(path, one_ahead(records), records.warnings, channel_map)
+    with closing(one_ahead(records)) as segments:
+        return reading_of_segments(path, segments, records.warnings, channel_map)
 
 
 def reading_of_segments(
@@ -369,11 +371,11 @@ def _split_tests(
     if not spans:
         start = min(int(time.min()) for time in times)
         spans = (Span(path.stem, start, None, None),)
-    placed = [_samples_of(spans, time) for time in times]
+    by_topic = [_samples_of(spans, time) for time in times]
     recordings = []
     for number, span in enumerate(spans):
         channels: dict[str, RecordedChannel] = {}
-        for data, mine in zip(topics, placed, strict=True):
+        for data, mine in zip(topics, by_topic, strict=True):
             channels |= _channels_of(data, mine[number], channel_map.layout)
         kind, named = classify_test(span.name)
         frequency = span.frequency_hz if span.frequency_hz is not None else named
@@ -391,10 +393,9 @@ class _Samples(NamedTuple):
 
 
 def _samples_of(spans: Sequence[Span], time: NDArray[np.int64]) -> list[_Samples]:
-    """The samples of each test, by their ``time`` [ns], which is not to be used any more.
+    """The samples of each test, by their ``time`` [ns], which is overwritten: a clock of the topic is lost with it.
 
-    Seconds of tests one after the other stand where the nanoseconds stood: an hour of both would take twice as long
-    a column.
+    Seconds of tests one after the other stand where the nanoseconds stood: both together would take twice the memory.
     """
     places = [_places_within(span, time) for span in spans]
     ends = [(each.start, each.stop) for each in places if isinstance(each, slice)]

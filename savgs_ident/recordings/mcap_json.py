@@ -62,7 +62,7 @@ class JsonDecoder:
         messages = self._parse([block.payload(index) for index in range(block.log.size)])
         table = _flat_table(messages, keys)
         if table is None:
-            return {key: _column(messages, tuple(key.split(".")), key) for key in keys}, _stamps(messages)
+            return {key: _column(messages, _path(key, messages[0]), key) for key in keys}, _stamps(messages)
         return dict(zip(keys, table.T, strict=True)), _stamps(messages)
 
     def _by_columns(
@@ -70,14 +70,14 @@ class JsonDecoder:
     ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64] | None] | None:
         """The same in a third of the time; None where a message is not like the first one, which then says why."""
         first = self._parse([block.payload(0)])[0]
-        numbers = [(key,) if key in first else tuple(key.split(".")) for key in keys]
+        numbers = [_path(key, first) for key in keys]
         clock = next(
             (each for each in _STAMPS if each[0] in first and _stamps([first], (each,)) is not None), None
         )
         stamps = [(*clock[:-2], part) for part in clock[-2:]] if clock else []
         try:
             columns = _columns(block, numbers, stamps)
-        except pa.ArrowInvalid:
+        except pa.ArrowException:
             return None
         if columns is None:
             return None
@@ -85,6 +85,8 @@ class JsonDecoder:
         if not stamps:
             return values, None
         sec, nanosec = columns[len(keys) :]
+        if max(np.abs(sec).max(), np.abs(nanosec).max() // 1_000_000_000) > _LAST_SECOND:
+            return None
         return values, sec * 1_000_000_000 + nanosec
 
     def _parse(self, texts: list[bytes]) -> list[dict[str, Any]]:
@@ -105,8 +107,17 @@ class JsonDecoder:
         return [json.loads(text) for text in texts]
 
 
+_LAST_SECOND = 2**32
+"""Seconds since 1970 that are no time of a recording any more: an integer might not hold their nanoseconds."""
+
+
+def _path(key: str, message: dict[str, Any]) -> tuple[str, ...]:
+    """The names that lead to a key: one, where a message has a field of that name, or those between its dots."""
+    return (key,) if key in message else tuple(key.split("."))
+
+
 _OBJECT, _LINE_END = ord("{"), ord("\n")
-_AT_ONCE = 1 << 16
+_TEXT_AT_ONCE = 1 << 16
 """Bytes of text that a core turns into numbers at a time; messages that are longer are not cut."""
 
 
@@ -115,9 +126,12 @@ def _columns(
 ) -> list[NDArray[Any]] | None:
     """Numbers, NaN where there is none, and integers at paths in all messages, (n,) each.
 
-    None where messages are no objects, each on a line, or lack one of the integers. Raises :class:`ArrowInvalid`
-    where something else stands at a path.
+    None where messages are no objects, each on a line, or lack one of the integers, and where a path goes on from the
+    end of another. Raises :class:`ArrowException` where something else stands at a path.
     """
+    paths = [*numbers, *stamps]
+    if any(one != other and one == other[: len(one)] for one in paths for other in paths):
+        return None
     raw = np.frombuffer(block.data, dtype=np.uint8)
     if (block.stops == block.starts).any() or (raw[block.starts] != _OBJECT).any():
         return None
@@ -132,7 +146,7 @@ def _columns(
         part[path[-1]] = kind
     table = pa_json.read_json(
         pa.py_buffer(lines),
-        pa_json.ReadOptions(block_size=max(_AT_ONCE, 2 * int((block.stops - block.starts).max()))),
+        pa_json.ReadOptions(block_size=max(_TEXT_AT_ONCE, 2 * int((block.stops - block.starts).max()))),
         pa_json.ParseOptions(explicit_schema=pa.schema(_fields(shape)), unexpected_field_behavior="ignore"),
         memory_pool=pa.system_memory_pool(),
     )
@@ -146,10 +160,11 @@ def _columns(
 
 def _as_lines(block: MessageBlock, raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Messages as text, each on a line of its own, which begins with its end."""
-    text = raw.copy()
-    text[block.starts - 1] = _LINE_END
+    begin = int(block.starts[0]) - 1
+    text = raw[begin : int(block.stops[-1])].copy()
     # Of a message and what stands before the next one, as two texts, every other one is taken: that moves memory.
-    edges = np.stack([block.starts - 1, block.stops], axis=1).ravel()
+    edges = np.stack([block.starts - 1, block.stops], axis=1).ravel() - begin
+    text[edges[::2]] = _LINE_END
     texts = pa.LargeBinaryArray.from_buffers(
         pa.large_binary(), edges.size - 1, [None, pa.py_buffer(edges), pa.py_buffer(text)]
     )

@@ -32,7 +32,7 @@ SLOWEST = 0.9
 
 _LEAST = float(np.finfo(np.float64).tiny)
 
-PART = 1 / 5
+SHARE_AT_A_TIME = 1 / 5
 """Share of the nodes that Newton's method is applied to at a time, or those of the largest dwell."""
 
 
@@ -53,7 +53,7 @@ class _Equations(NamedTuple):
 class _Progress(NamedTuple):
     """Motions at the nodes, and what is left of each dwell relative to the size of its motion [1], (D,).
 
-    A dwell is ``lost`` that cannot be found.
+    Where Newton's method was applied that is its last step. ``lost`` is whether it did not find some dwell.
     """
 
     at: Trajectory
@@ -70,11 +70,11 @@ def solve_near(
     enough: float,
     closely: float,
 ) -> tuple[Trajectory, Float[Array, ""]]:
-    """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step [1].
+    """Motions on the nodes of a ``known`` solution from a close ``start``, and the most that is left of one [1].
 
     To be a part of a larger program that is compiled. Chord steps suffice where what is left of a dwell is below
-    ``closely``, Newton's where the last one is below ``enough``: what it leaves is far smaller. Look at the step: it
-    is above ``enough`` where ``limit`` iterations were too few.
+    ``closely``, Newton's where the last one is below ``enough``: what it leaves is far smaller. Look at what is left:
+    it is above ``enough`` where ``limit`` iterations were too few.
     """
     excitation, mesh = known.excitation, known.mesh
     layout = mesh.layout
@@ -123,8 +123,8 @@ def _chord_step(
 class _Part(NamedTuple):
     """Some dwells of a layout as a :class:`NodeOrder` of their own, and which of its nodes they are.
 
-    ``nodes`` are numbers of nodes of the layout, (P,), in places that no dwell needs those of another; ``kept`` are
-    the same, but one beyond the last in such places. ``dwells`` are numbers of dwells, (D,), one beyond the last
+    ``nodes`` are numbers of nodes of the layout, (P,), in places that no dwell needs those of another; ``write_to``
+    are the same, but one beyond the last in such places. ``dwells`` are numbers of dwells, (D,), one beyond the last
     where there is none.
     """
 
@@ -135,17 +135,17 @@ class _Part(NamedTuple):
     chunk_place: Int[Array, " C"]
     loose: Array | None
     nodes: Int[Array, " P"]
-    kept: Int[Array, " P"]
+    write_to: Int[Array, " P"]
     dwells: Int[Array, " D"]
 
 
-def worst_dwells(layout: Layout, left: Float[Array, " D"], room: int) -> _Part:
-    """Those dwells of which most is ``left`` [1], as many as there is ``room`` for in chunks."""
+def worst_dwells(layout: Layout, left: Float[Array, " D"], enough: float, room: int) -> _Part:
+    """Those dwells of which most is ``left`` [1], more than ``enough``, and as there is ``room`` for in chunks."""
     chunks = np.asarray(layout.counts) // CHUNK
     slots = min(len(chunks), room // int(chunks.min()))
     most, first = int(chunks.max()), jnp.asarray(layout.starts // CHUNK)
     worst = jnp.argsort(-left)[:slots]
-    size = jnp.asarray(chunks)[worst]
+    size = jnp.where(left[worst] > enough, jnp.asarray(chunks)[worst], 0)
     ends = jnp.cumsum(size)
     size = jnp.where(ends <= room, size, 0)
     begins = jnp.where(ends <= room, ends - size, 0)
@@ -173,7 +173,7 @@ def worst_dwells(layout: Layout, left: Float[Array, " D"], room: int) -> _Part:
         chunk_place=jnp.where(taken, owner * most + chunk - begins[owner], 0),
         loose=None if layout.loose is None else jnp.asarray(layout.loose)[nodes],
         nodes=nodes,
-        kept=jnp.where(valid, nodes, layout.total),
+        write_to=jnp.where(valid, nodes, layout.total),
         dwells=jnp.where(size > 0, worst, len(chunks)),
     )
 
@@ -182,8 +182,8 @@ def _worst_solved(
     equations: _Equations, layout: Layout, now: _Progress, limit: int, enough: float
 ) -> _Progress:
     """Newton's method applied to the dwells that are worst off."""
-    room = max(max(layout.counts), int(PART * layout.total)) // CHUNK
-    part = worst_dwells(layout, now.left, room)
+    room = max(max(layout.counts), int(SHARE_AT_A_TIME * layout.total)) // CHUNK
+    part = worst_dwells(layout, now.left, enough, room)
     model, p, prepared, u, steps, scale = equations
     found = solve_newton(
         model,
@@ -198,7 +198,7 @@ def _worst_solved(
         jnp.asarray(enough),
     )
     at = jax.tree.map(
-        lambda every, some: every.at[:, part.kept].set(some, mode="drop"), now.at, found.trajectory
+        lambda every, some: every.at[:, part.write_to].set(some, mode="drop"), now.at, found.trajectory
     )
     left = now.left.at[part.dwells].set(found.last_step, mode="drop")
     return _Progress(at, left, ~jnp.all(found.last_step <= enough))

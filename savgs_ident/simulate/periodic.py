@@ -132,7 +132,7 @@ def solve_newton(
         change, lin = _newton_step(model, p, prepared, at, u, layout, steps)
         relative = jnp.abs(change.x) / scale
         length, moved = (
-            # No node at all may belong to a dwell of a part of a layout.
+            # A dwell of a part of a layout may have no nodes.
             jnp.maximum(over_dwells(jnp.max(each, axis=0), layout), 0.0)
             for each in (relative, relative[:coordinates])
         )

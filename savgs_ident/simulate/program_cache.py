@@ -22,7 +22,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
@@ -203,10 +203,13 @@ _EFFORT = "xla_backend_optimization_level"
 def first_alone(program: Callable[..., Value], *args: Any) -> Value:
     """``program(*args)``; the first time for arguments of these shapes, threads that ask for it meanwhile wait."""
     key = program, signature(args)
-    with _WORKING.setdefault(key, threading.Lock()) if key not in _DONE else nullcontext():
-        found = program(*args)
-    _DONE.add(key)
-    return found
+    if key not in _DONE:
+        with _WORKING.setdefault(key, threading.Lock()):
+            if key not in _DONE:
+                found = program(*args)
+                _DONE.add(key)
+                return found
+    return program(*args)
 
 
 def signature(tree: Any) -> Hashable:
@@ -342,6 +345,7 @@ def make_room_for_programs(most: int = MANY_REGIONS, most_memory: int = MUCH_MEM
     if mapped_regions() > most or memory_in_use() > most_memory:
         jax.clear_caches()
         _DONE.clear()
+        _WORKING.clear()
         gc.collect()
         _give_back()
 

@@ -87,7 +87,7 @@ def harmonic_sensitivities(
 def harmonics_with_sensitivities(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str], orders: int
 ) -> tuple[Complex[Array, "D C K"], Complex[Array, "n D C K"]]:
-    """Harmonics 0..orders of the sensor readings, and their derivatives, by one program for all that asks for them.
+    """Harmonics 0..orders of the sensor readings, and their derivatives, by the same programs for all who ask.
 
     They are in the unit of the reading, and per unit of the parameter.
     """
@@ -101,7 +101,7 @@ def harmonics_with_sensitivities(
 def rehearse_sensitivities(
     model: AbstractPlant, p: Values, blank: PeriodicSolution, names: Sequence[str], orders: int
 ) -> None:
-    """Have the programs of these compiled, on a :func:`blank_solution`: nothing is computed of the motion."""
+    """Have the programs of these compiled, on a :func:`blank_solution`; no derivative is computed."""
     p, blank = placed((dict(p), blank))
     places, nothing = placed((jnp.zeros(len(names), int), jnp.asarray(0)))
     _by_places(model, p, blank, places, nothing, orders)

@@ -6,7 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.simulate.mesh import Mesh, adapted_mesh, layout_for, uniform_mesh
+from savgs_ident.simulate.mesh import (
+    CHUNK,
+    Layout,
+    Mesh,
+    adapted_mesh,
+    layout_for,
+    places_between,
+    uniform_mesh,
+)
 
 FREQUENCY = np.array([0.5, 2.0, 6.0])
 JUMPS = np.array([1.0, 1.0 + np.pi])
@@ -110,3 +118,24 @@ def test_sums_over_adapted_nodes_are_as_good_as_on_equal_ones(steepness: float) 
         kernel = np.exp(-1j * order * phase[mine, None]) * weight[mine, None]
         found = np.where(order == 0, 1.0, 2.0) * (series[mine] @ kernel)
         assert found == pytest.approx(wanted, abs=1e-6)
+
+
+@given(st.lists(st.integers(1, 3), min_size=1, max_size=4), st.integers(0, 2**31))
+def test_nodes_lie_between_those_of_another_mesh_as_interpolation_has_it(
+    chunks: list[int], seed: int
+) -> None:
+    random, layout = np.random.default_rng(seed), Layout(tuple(CHUNK * each for each in chunks))
+    before, after = (
+        adapted_mesh(
+            uniform_mesh(layout), random.standard_normal((2, layout.total)), np.ones(len(chunks)), layout
+        )
+        for _ in range(2)
+    )
+    values = random.standard_normal(layout.total)
+    place, share = places_between(before, after)
+    found = values[place] + share * (values[layout.following[place]] - values[place])
+    for dwell in range(len(chunks)):
+        mine = layout.dwell == dwell
+        wanted, known = np.asarray(after.phase)[mine], np.asarray(before.phase)[mine]
+        expected = np.interp(wanted, known, values[mine], period=2.0 * np.pi)
+        np.testing.assert_allclose(found[mine], expected, atol=1e-9)

@@ -29,21 +29,25 @@ CHANGES = {"mu_r": 1.01, "mu_t": 0.97, "ydot_Hth": 1.02, "k_t": 1.01}
 """A standard error or two of a fit, and where friction sticks moves with them."""
 
 
-@given(st.sampled_from(LAYOUTS), st.permutations(range(4)), st.integers(3, 7))
-def test_a_part_holds_the_worst_dwells_whole(layout: Layout, order: list[int], room: int) -> None:
+@given(
+    st.sampled_from(LAYOUTS), st.permutations(range(4)), st.integers(3, 7), st.sampled_from((0.0, 1.5, 3.5))
+)
+def test_a_part_holds_the_worst_dwells_whole(
+    layout: Layout, order: list[int], room: int, enough: float
+) -> None:
     left = np.empty(4)
     left[order] = [4.0, 3.0, 2.0, 1.0]
-    part = worst_dwells(layout, jnp.asarray(left), room)
+    part = worst_dwells(layout, jnp.asarray(left), enough, room)
     slots = min(4, room)
     fitting, free = [], room
     for dwell in order[:slots]:
         free -= layout.counts[dwell] // CHUNK
-        if free < 0:
+        if free < 0 or left[dwell] <= enough:
             break
         fitting.append(dwell)
     dwells = np.asarray(part.dwells)
     assert dwells[dwells < 4].tolist() == fitting
-    kept, nodes, ahead = (np.asarray(each) for each in (part.kept, part.nodes, part.following))
+    kept, nodes, ahead = (np.asarray(each) for each in (part.write_to, part.nodes, part.following))
     needed = kept < layout.total
     assert kept[needed].tolist() == layout.nodes_of(fitting).tolist()
     np.testing.assert_array_equal(nodes[ahead[needed]], layout.following[nodes[needed]])
@@ -58,9 +62,9 @@ def _whole(layout: Layout, steps: Array, right: Array) -> Array:
 
 @partial(jax.jit, static_argnums=0)
 def _in_part(layout: Layout, left: Array, steps: Array, right: Array) -> tuple[Array, Array]:
-    part = worst_dwells(layout, left, 4)
+    part = worst_dwells(layout, left, 0.0, 4)
     factors = collocation.factorise_recurrence(part, steps[:, :, part.nodes])
-    return part.kept, collocation.solve_recurrence(part, factors, right[:, part.nodes])
+    return part.write_to, collocation.solve_recurrence(part, factors, right[:, part.nodes])
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -97,6 +101,19 @@ def test_the_motions_are_those_of_newtons_method(
     missed = np.abs(np.asarray(found.x - expected.trajectory.x)) / size
     assert moved.max() > 1e-2
     assert missed.max() < off
+
+
+def test_close_by_no_step_of_newtons_method_is_needed(
+    friction: QuarterCar, numbers: Values, few: PeriodicSolution
+) -> None:
+    p = altered(numbers, {name: (1.0 + 1e-6) * float(numbers[name]) for name in CHANGES})
+    found, left = _near(friction, p, few, 0, 1e-6)
+    expected = resolve(friction, p, few)
+    assert float(left) <= 1e-6
+    moved = np.abs(np.asarray(few.trajectory.x - expected.trajectory.x)).max(axis=1)
+    missed = np.abs(np.asarray(found.x - expected.trajectory.x)).max(axis=1)
+    assert np.all(moved > 0.0)
+    assert np.all(missed < 0.05 * moved)
 
 
 def test_at_the_known_parameters_nothing_moves(

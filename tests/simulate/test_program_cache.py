@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import solve_dense
 from savgs_ident.simulate import program_cache
-from savgs_ident.simulate.program_cache import done_once, run_cached
+from savgs_ident.simulate.program_cache import done_once, first_alone, run_cached
 
 _SOLVE = """
 import jax.monitoring
@@ -140,6 +140,27 @@ def test_work_that_several_threads_ask_for_is_done_once_and_waited_for() -> None
     with ThreadPoolExecutor(4) as pool:
         seen = list(pool.map(ask, range(4)))
     assert seen == [1, 1, 1, 1]
+
+
+def test_the_first_of_several_threads_is_alone_and_the_others_are_not() -> None:
+    running, most = [0], [0]
+
+    def program(_: float) -> float:
+        running[0] += 1
+        most[0] = max(most[0], running[0])
+        alone.append(running[0])
+        sleep(0.2)
+        running[0] -= 1
+        return 1.0
+
+    alone: list[int] = []
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda _: first_alone(program, 2.0), range(4))) == [1.0] * 4
+    assert alone[0] == 1
+    assert most[0] > 1
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: first_alone(program, 2.0), range(4)))
+    assert most[0] == 4
 
 
 def test_work_that_failed_is_done_again() -> None:
