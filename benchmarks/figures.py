@@ -55,6 +55,15 @@ FIGURES: dict[str, Figure] = {
     ),
     "speedup_gradient_scipy": Figure("x", ".1f", "The same for scipy (computed: 1 + 4 runs)."),
     "speedup_gradient_diffrax": Figure("x", ".1f", "The same for diffrax (computed: 1 + 4 runs)."),
+    "speedup_shooting": Figure(
+        "x", ".0f", "How many times longer shooting with finite differences takes for a dwell."
+    ),
+    "speedup_gradient_shooting": Figure(
+        "x", ".0f", "The same for value and gradient (computed: 1 + 4 runs)."
+    ),
+    "shooting_ms_per_frequency": Figure("ms", ".0f", "A dwell by shooting, mean of those solved."),
+    "shooting_dwells_solved": Figure("", ".0f", "Dwells that it solves within 0.1 %."),
+    "error_percent_shooting": Figure("%", ".3f", "Its largest error in these dwells."),
     "harmonicbalance_ms_per_frequency": Figure(
         "ms", ".0f", "A dwell by `harmonicbalance`, mean of those solved."
     ),

@@ -8,12 +8,12 @@ from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import DWELLS_HZ
 
 NAMES = (
-    "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
-    "readers", "diagnosis", "sindy", "closed-loop", "campaigns",
+    "response", "harmonicbalance", "scipy", "diffrax", "shooting", "fit", "posterior", "posterior-scipy",
+    "collocation", "mcap", "readers", "diagnosis", "sindy", "closed-loop", "campaigns",
 )  # fmt: skip
 """What can be asked for."""
 
-PEERS = ("harmonicbalance", "scipy", "diffrax")
+PEERS = ("harmonicbalance", "scipy", "diffrax", "shooting")
 
 
 class Size(NamedTuple):
@@ -93,7 +93,7 @@ def _processes(names: Sequence[str], size: Size, progress: Progress) -> Outcome:
 
 
 def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], progress: Progress) -> Outcome:
-    from benchmarks import by_diffrax, by_harmonicbalance, by_package, by_scipy
+    from benchmarks import by_diffrax, by_harmonicbalance, by_package, by_scipy, by_shooting
     from benchmarks.task import make_task
 
     task = make_task(dwells_hz)
@@ -109,6 +109,8 @@ def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], progress: Pro
         outcome += by_scipy.measure(task, reference, progress)
     if "harmonicbalance" in names:
         outcome += by_harmonicbalance.measure(task, reference, progress)
+    if "shooting" in names:
+        outcome += by_shooting.measure(task, reference, progress)
     return outcome
 
 
