@@ -30,7 +30,7 @@ from rich.console import Console, RenderableType
 from rich.status import Status
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import beside
+from savgs_ident.core.threads import beside
 from savgs_ident.report.text import plain
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ existing Dask cluster whose address is given. A process has one task at a time, 
 concerns that task and no other: what a worker that was killed had in hand is done again by another one, and what is
 killed each time is :class:`Lost`. Ctrl-C ends the processes and leaves what came before with the caller, who keeps
 each result as it comes (:mod:`savgs_ident.campaigns.store`, :mod:`savgs_ident.validation.trials`); the processes end
-with the program, however it ends. What is too short for processes runs in threads over all cores
-(:func:`in_parallel`, :func:`side_by_side`): compiled solvers release Python's lock while they run.
+with the program, however it ends. What is too short for processes runs in threads (:mod:`savgs_ident.core.threads`).
 
 The processes are our own because in loky's executor, as in that of the standard library, a process that is killed
 breaks the pool, every task in hand is lost with it, and nothing says which one was to blame. Dask's local cluster
@@ -30,15 +29,14 @@ import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from savgs_ident.core.errors import InputError
 
@@ -395,41 +393,3 @@ def _no_answer(address: str, what: str) -> InputError:
         source="--scheduler",
         remedy="start `dask scheduler` and `dask worker ADDRESS`, and give the address that it prints",
     )
-
-
-Item = TypeVar("Item")
-Other = TypeVar("Other")
-
-
-def in_parallel(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Apply ``work`` to every item on all cores; results in the order of the items."""
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(work, items))
-
-
-def one_ahead(items: Iterable[Item]) -> Generator[Item]:
-    """The items, each made in another thread while the one before it is worked on.
-
-    What making one raises is raised where it is asked for.
-    """
-    iterator, end = iter(items), object()
-    with ThreadPoolExecutor(1) as pool:
-        begun = pool.submit(next, iterator, end)
-        while (item := begun.result()) is not end:
-            begun = pool.submit(next, iterator, end)
-            yield cast(Item, item)
-
-
-@contextmanager
-def beside(work: Callable[[], object]) -> Iterator[None]:
-    """Have ``work`` done in another thread meanwhile; the end waits for it, and what it raises is not raised."""
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(work)
-        yield
-
-
-def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
-    """Run two functions at the same time and return both results."""
-    with ThreadPoolExecutor(1) as pool:
-        begun = pool.submit(other)
-        return one(), begun.result()

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import in_parallel, side_by_side
 from savgs_ident.diagnosis.candidates import confusable_of
 from savgs_ident.diagnosis.evidence import (
     DiagnosisEvidence,

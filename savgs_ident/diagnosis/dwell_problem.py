@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
+from savgs_ident.core.threads import side_by_side
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import alike_tests, rehearse, secants_of_terms
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map

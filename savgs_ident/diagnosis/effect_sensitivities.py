@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.small_root import jacobian, solve_dense
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import (
     AbstractForceLaw,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.diagnosis.findings import explains_all, hypothesis_of, left_over
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import (

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import STEPS, find_map_again
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.status import Status
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.learned_functions import (

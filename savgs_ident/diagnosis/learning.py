@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.threads import in_parallel, side_by_side
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.law_families import FittedFunctions, families_fitted, families_spared
 from savgs_ident.diagnosis.learning_start import best_places, widths_alone, with_amplitudes

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.effect_sensitivities import marched_contact, marched_effect
 from savgs_ident.diagnosis.localisation import Localisation

@@ -23,8 +23,8 @@ from math import hypot, log, sqrt
 import numpy as np
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import side_by_side
 from savgs_ident.diagnosis.evidence import (
     DiagnosisEvidence,
     DiagnosisProblem,

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.result import NextTest
 from savgs_ident.effects.base import AbstractInputLaw

@@ -19,8 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import in_parallel, side_by_side
 from savgs_ident.diagnosis.findings import (
     Findings,
     LostHypothesis,

@@ -21,9 +21,9 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import beside
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
+from savgs_ident.core.threads import beside
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.identifiability import (

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.core.threads import side_by_side
 from savgs_ident.fit.along_motion import MotionComparison, MotionFit, compare_along_motion, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.near_mode import (

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
+from savgs_ident.core.threads import in_parallel, side_by_side
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,

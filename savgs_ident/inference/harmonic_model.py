@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.status import joint_status
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.inference.background.locations import Linearisation
 from savgs_ident.inference.background.shared_errors import background_about
 from savgs_ident.inference.likelihood import Likelihood, sharing_errors

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.inference.drive_force import ForceRows, force_data, force_rows
 from savgs_ident.inference.likelihood import RowLikelihood

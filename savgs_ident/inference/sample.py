@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
+from savgs_ident.core.threads import side_by_side
 from savgs_ident.inference.diagnostics import (
     assess_convergence,
     enough,

@@ -13,7 +13,7 @@ from math import inf
 import numpy as np
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.recordings.checks_signal import (
     LONGEST_GAP,
     DataLocation,

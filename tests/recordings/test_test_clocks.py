@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from savgs_ident.recordings.mcap import _samples_of
 from savgs_ident.recordings.mcap_timing import Span
+from savgs_ident.recordings.mcap_topics import _samples_of
 
 instants = st.lists(st.integers(0, 60), min_size=1, max_size=40)
 spans = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 20)), min_size=1, max_size=4)

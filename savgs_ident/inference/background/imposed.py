@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Complex
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.threads import in_parallel
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Load, PortSignals
 from savgs_ident.effects.composition import nothing_imposed

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from savgs_ident.core.executor import beside, one_ahead
+from savgs_ident.core.threads import beside, one_ahead
 
 
 def test_items_come_in_order_from_another_thread_one_ahead() -> None:

@@ -1,0 +1,46 @@
+"""Work in threads over all cores: compiled solvers, and readers in C, release Python's lock while they run."""
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TypeVar, cast
+
+from savgs_ident.core.executor import cores
+
+Result = TypeVar("Result")
+Item = TypeVar("Item")
+Other = TypeVar("Other")
+
+
+def in_parallel(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Apply ``work`` to every item on all cores; results in the order of the items."""
+    with ThreadPoolExecutor(cores()) as pool:
+        return list(pool.map(work, items))
+
+
+def one_ahead(items: Iterable[Item]) -> Generator[Item]:
+    """The items, each made in another thread while the one before it is worked on.
+
+    What making one raises is raised where it is asked for.
+    """
+    iterator, end = iter(items), object()
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(next, iterator, end)
+        while (item := begun.result()) is not end:
+            begun = pool.submit(next, iterator, end)
+            yield cast(Item, item)
+
+
+@contextmanager
+def beside(work: Callable[[], object]) -> Iterator[None]:
+    """Have ``work`` done in another thread meanwhile; the end waits for it, and what it raises is not raised."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(work)
+        yield
+
+
+def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
+    """Run two functions at the same time and return both results."""
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(other)
+        return one(), begun.result()
