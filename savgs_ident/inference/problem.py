@@ -150,7 +150,7 @@ def evaluate_beside(problem: Problem, u: Float[Array, " n"], pins: Pins, best: E
     p = problem.parameters(u)
     solution = resolve(problem.model, p, best.solution, problem.iterations)
     predicted = harmonics(problem.model, p, solution, problem.orders)
-    residual = _residual_alone(problem.free, problem.target, pins, u, predicted)
+    residual = _residual(problem.free, problem.target, pins, u, predicted)
     if np.sum(np.asarray(residual) ** 2) < np.sum(np.asarray(best.at.residual) ** 2):
         return _evaluation(problem, pins, u, p, solution)
     return Evaluation(Linearised(u, residual, best.at.jacobian), solution)
@@ -174,10 +174,6 @@ def _residual_and_jacobian(
 
 
 @eqx.filter_jit
-def _residual_alone(free: FreeVector, target: Target, pins: Pins, u: Array, predicted: Array) -> Array:
-    return _residual(free, target, pins, u, predicted)
-
-
 def _residual(free: FreeVector, target: Target, pins: Pins, u: Array, predicted: Array) -> Array:
     return jnp.concatenate([target(predicted), free.prior_residuals(u), pins.weight * (u - pins.at)])
 
