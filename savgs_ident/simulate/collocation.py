@@ -11,16 +11,19 @@ with g = 1/2, or g = 1 for states that slip, where backward Euler is the exact p
 
     A_{n+1} dx_{n+1} = B_n dx_n + d_n,    A_n = I - h_{n-1} g F_n,    B_n = I + h_n (1 - g) F_n,
 
-with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrices M_n = B_n A_n^-1 need one node only:
+with F = d(xd)/dx. In terms of a_n = A_n dx_n it is an affine recurrence whose matrices M_n = B_n A_n^-1 need one node
+only:
 
-    x_{n+1} = M_n x_n + d_n,    x_N = x_0.
+    a_{n+1} = M_n a_n + d_n,    a_N = a_0.
 
-Such recurrences are solved dwell by dwell (:func:`factorise_recurrence`, :func:`solve_recurrence`). Eliminating from
-node to node is stable because a rig forgets its past (the products of M_n shrink). Products are formed in chunks, all
-chunks of all dwells at a time, then over the chunks of a dwell; the period closes with
-(I - M_{N-1} ... M_0) x_0 = d. A window that begins with a given state does not close: with M_{N-1} = 0 and
-d_{N-1} = 0 its first state stays as it is. The factorisation serves any number of right sides, which is what makes
-sensitivities cheap.
+M_n is never formed (:func:`_one_step`). A_n and B_n are the same but for the time step, so that dx_n, which is wanted
+anyway, gives M_n a_n = dx_n + r_n (dx_n - a_n); and the rate of a coordinate is a speed, so that of A_n^-1 only the
+k rows of speeds and internal states are multiplied. The recurrence is solved dwell by dwell
+(:func:`factorise_steps`, :func:`solve_steps`). Eliminating from node to node is stable because a rig forgets its past
+(the products of M_n shrink). Products are formed in chunks, all chunks of all dwells at a time, then over the chunks
+of a dwell; the period closes with (I - M_{N-1} ... M_0) a_0 = d. A window that begins with a given state does not
+close: with M_{N-1} = 0 and d_{N-1} = 0 its first state stays as it is. The factorisation serves any number of right
+sides, which is what makes sensitivities cheap.
 
 Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
 a long vector.
@@ -32,7 +35,9 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import AbstractPlant, Motion
@@ -77,13 +82,32 @@ def invert_nodes(matrix: Matrices) -> Matrices:
     return jnp.concatenate([upper, jnp.concatenate([-multiply_nodes(last, left), last], axis=1)])
 
 
-class CyclicFactors(NamedTuple):
-    """Factorised recurrence: step matrices, products over chunks, inverses of I - (product of a period).
+class Steps(NamedTuple):
+    """Steps from node to node, whose matrices are M_n = B_n A_n^-1.
 
-    Entries are in the units of the states per those of the states.
+    Attributes:
+        lower: the last k rows of A^-1, in the units of the states per those of the states, (k, m, P).
+        before: time from the node before [s], (P,).
+        ratio: time to the next node over that [1], (P,).
     """
 
-    steps: Float[Array, "m m P"]
+    lower: Float[Array, "k m P"]
+    before: Float[Array, " P"]
+    ratio: Float[Array, " P"]
+
+
+class CyclicFactors(NamedTuple):
+    """Factorised steps of C chunks of L nodes.
+
+    Attributes:
+        steps: the steps by place in a chunk, arrays with a leading axis (L,) and the chunks last.
+        weight: weight g of the far end of a step for each state [1], (m, 1).
+        chunks: products of their matrices over chunks, (m, m, C).
+        closing: inverses of I - (product of a period), (D, m, m).
+    """
+
+    steps: Steps
+    weight: Float[Array, "m 1"]
     chunks: Float[Array, "m m C"]
     closing: Float[Array, "D m m"]
 
@@ -103,56 +127,97 @@ def _opened(layout: NodeOrder, values: Float[Array, "*k P"]) -> Float[Array, "*k
     return values if layout.loose is None else jnp.where(layout.loose, 0.0, values)
 
 
-def factorise_recurrence(layout: NodeOrder, steps: Float[Array, "m m P"]) -> CyclicFactors:
-    """Factorise the recurrence with step matrices M_n [units of the states per those of the states]."""
+class _Stepped(NamedTuple):
+    """What one step makes of a_n, (m, j, P): dx_n, dx_n's rate from a state of no imbalance, (k, j, P), M_n a_n."""
 
-    def compose(matrices: Array) -> Array:
-        total, _ = jax.lax.scan(
-            lambda done, step: (multiply_nodes(step, done), None), matrices[0], matrices[1:]
-        )
-        return total
+    change: Array
+    rate: Array
+    ahead: Array
 
-    steps, eye = _opened(layout, steps), jnp.eye(steps.shape[0])
-    chunks = compose(by_chunks(steps))
-    period = compose(_over_chunks(layout, chunks, eye))
+
+def _one_step(steps: Steps, weight: Float[Array, "m 1"], a: Float[Array, "m j P"]) -> _Stepped:
+    rows, size = steps.lower.shape[:2]
+    n, late = size - rows, weight[:, None] * steps.before
+    rest = multiply_nodes(steps.lower, a)
+    change = jnp.concatenate([a[:n] + late[:n] * rest[:n], rest])
+    through = (1.0 / weight - 1.0)[:, None] * steps.ratio
+    return _Stepped(change, (rest - a[n:]) / late[n:], change + through * (change - a))
+
+
+def step_matrices(steps: Steps, weight: Float[Array, "m 1"]) -> Float[Array, "m m P"]:
+    """The matrices M_n [units of the states per those of the states]."""
+    size, nodes = steps.lower.shape[1:]
+    return _one_step(steps, weight, _identities(size, nodes)).ahead
+
+
+def _identities(size: int, nodes: int) -> Matrices:
+    return jnp.broadcast_to(jnp.eye(size)[:, :, None], (size, size, nodes))
+
+
+def factorise_steps(layout: NodeOrder, steps: Steps, weight: Float[Array, "m 1"]) -> CyclicFactors:
+    """Factorise the recurrence that goes on by these steps, with the ``weight`` [1] of their far ends."""
+
+    def pass_on(done: Array, given: tuple[Steps, Array | None]) -> tuple[Array, None]:
+        step, loose = given
+        ahead = _one_step(step, weight, done).ahead
+        return ahead if loose is None else jnp.where(loose, 0.0, ahead), None
+
+    def compose(done: Array, matrices: Array) -> tuple[Array, None]:
+        return multiply_nodes(matrices, done), None
+
+    size, inside = steps.lower.shape[1], Steps(*map(by_chunks, steps))
+    begin = _identities(size, inside.before.shape[-1])
+    chunks, _ = jax.lax.scan(pass_on, begin, (inside, _loose_chunks(layout)))
+    over, eye = _over_chunks(layout, chunks, jnp.eye(size)), jnp.eye(size)
+    period, _ = jax.lax.scan(compose, over[0], over[1:])
     closing = jnp.linalg.inv(jnp.moveaxis(eye[:, :, None] - period, -1, 0))
-    return CyclicFactors(steps, chunks, closing)
+    return CyclicFactors(inside, weight, chunks, closing)
 
 
-def solve_recurrence(
-    layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]
-) -> Float[Array, "m P"]:
-    """The periodic x_n for right sides d_n, which belong to the step from node n to the next.
+def _loose_chunks(layout: NodeOrder) -> Array | None:
+    return None if layout.loose is None else by_chunks(jnp.asarray(layout.loose))
 
-    States keep the units of the right sides.
-    """
+
+class Changes(NamedTuple):
+    """dx_n at the nodes, (m, P), and how fast it changes beside what is imposed, slope dx_n, (k, P); SI."""
+
+    x: Float[Array, "m P"]
+    rate: Float[Array, "k P"]
+
+
+def solve_steps(layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]) -> Changes:
+    """The periodic dx_n for right sides d_n [units of the states], of the step from node n to the next."""
     return _solve_opened(layout, factors, _opened(layout, right))
 
 
-def _solve_opened(
-    layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]
-) -> Float[Array, "m P"]:
+def _solve_opened(layout: NodeOrder, factors: CyclicFactors, right: Float[Array, "m P"]) -> Changes:
     """The same, where what stands at the last node of a window that does not close is how it begins."""
 
-    def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
-        return apply_nodes(step[0], x) + step[1], None
+    def pass_on(a: Array, given: tuple[Steps, Array, Array | None]) -> tuple[Array, Changes]:
+        step, side, loose = given
+        change, rate, ahead = (each[:, 0] for each in _one_step(step, factors.weight, a[:, None]))
+        ahead = ahead if loose is None else jnp.where(loose, 0.0, ahead)
+        return ahead + side, Changes(change, rate)
 
-    def pass_on(x: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
-        return apply_nodes(step[0], x) + step[1], x
+    def end(a: Array, given: tuple[Steps, Array, Array | None]) -> tuple[Array, None]:
+        return pass_on(a, given)[0], None
+
+    def over_chunk(a: Array, given: tuple[Array, Array]) -> tuple[Array, Array]:
+        return apply_nodes(given[0], a) + given[1], a
 
     size = right.shape[0]
-    inside = (by_chunks(factors.steps), by_chunks(right))
-    sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
+    given = (factors.steps, by_chunks(right), _loose_chunks(layout))
+    sides, _ = jax.lax.scan(end, jnp.zeros_like(given[1][0]), given)
     over = (
         _over_chunks(layout, factors.chunks, jnp.eye(size)),
         _over_chunks(layout, sides, jnp.zeros(size)),
     )
-    period_side, _ = jax.lax.scan(end, jnp.zeros_like(over[1][0]), over)
+    period_side, _ = jax.lax.scan(over_chunk, jnp.zeros_like(over[1][0]), over)
     start = jnp.einsum("dij,jd->id", factors.closing, period_side)
-    _, starts = jax.lax.scan(pass_on, start, over)
+    _, starts = jax.lax.scan(over_chunk, start, over)
     begins = jnp.moveaxis(starts, 0, -1).reshape(size, -1)[:, layout.chunk_place]
-    _, nodes = jax.lax.scan(pass_on, begins, inside)
-    return jnp.moveaxis(nodes, 0, -1).reshape(right.shape)
+    _, nodes = jax.lax.scan(pass_on, begins, given)
+    return Changes(*(jnp.moveaxis(each, 0, -1).reshape(-1, right.shape[1]) for each in nodes))
 
 
 Nodes = Float[Array, "k P"]
@@ -168,30 +233,30 @@ class Trajectory(NamedTuple):
 class Linearised(NamedTuple):
     """A trajectory's linearisation, ready to solve for any right side.
 
-    ``imbalance`` is -(dr/dy)^-1 r, (k, P); ``slope`` is dy/dx, (k, m, P); ``per_residual`` (dr/dy)^-1;
-    ``inverse`` A^-1. Residuals, x and y are in SI.
+    ``imbalance`` is -(dr/dy)^-1 r, (k, P); ``per_residual`` (dr/dy)^-1, (k, k, P). Residuals, x and y are in SI.
     """
 
     imbalance: Nodes
-    slope: Float[Array, "k m P"]
     per_residual: Float[Array, "k k P"]
-    inverse: Float[Array, "m m P"]
     factors: CyclicFactors
 
 
 def blank_linearised(model: AbstractPlant, layout: NodeOrder) -> Linearised:
     """Zeros of the shapes that :func:`linearise` gives."""
     n, nodes, dwells = len(model.coordinates), layout.dwell.size, len(layout.chunk_table)
-    inner = n + len(model.states)
+    inner, chunks = n + len(model.states), nodes // CHUNK
     size = n + inner
     return Linearised(
         imbalance=jnp.zeros((inner, nodes)),
-        slope=jnp.zeros((inner, size, nodes)),
         per_residual=jnp.zeros((inner, inner, nodes)),
-        inverse=jnp.zeros((size, size, nodes)),
         factors=CyclicFactors(
-            steps=jnp.zeros((size, size, nodes)),
-            chunks=jnp.zeros((size, size, nodes // CHUNK)),
+            steps=Steps(
+                lower=jnp.zeros((CHUNK, inner, size, chunks)),
+                before=jnp.zeros((CHUNK, chunks)),
+                ratio=jnp.zeros((CHUNK, chunks)),
+            ),
+            weight=jnp.zeros((size, 1)),
+            chunks=jnp.zeros((size, size, chunks)),
             closing=jnp.zeros((dwells, size, size)),
         ),
     )
@@ -259,28 +324,22 @@ def linearise(
     per_residual = invert_nodes(jacobian[:, size:])
     slope = -multiply_nodes(per_residual, jacobian[:, :size])
     imbalance = -apply_nodes(per_residual, residual)
-    weight, before = implicitness(model)[:, None], steps[layout.preceding]
-    inverse = _inverse_of_step(before * weight, slope, n)
-    # B_n is A_n but for the step and its share: B_n A_n^-1 follows without a product.
-    ratio = steps * (1.0 - weight) / (before * weight)
-    matrices = inverse + ratio * (inverse - jnp.eye(size)[:, :, None])
-    return Linearised(imbalance, slope, per_residual, inverse, factorise_recurrence(layout, matrices))
+    weight, before = implicitness(model), steps[layout.preceding]
+    lower = _lower_inverse(before * weight[:, None], slope, n)
+    factors = factorise_steps(layout, Steps(lower, before, steps / before), weight)
+    return Linearised(imbalance, per_residual, factors)
 
 
-def _inverse_of_step(share: Float[Array, "m 1 P"], slope: Float[Array, "k m P"], n: int) -> Matrices:
-    """A^-1 for steps times the weight of their far end [s], of a plant with n coordinates.
+def _lower_inverse(share: Float[Array, "m 1 P"], slope: Float[Array, "k m P"], n: int) -> Matrices:
+    """The last k rows of A^-1 for steps times the weight of their far end [s], of a plant with n coordinates.
 
-    The rate of a coordinate is a speed: only the other k rows are inverted.
+    The rate of a coordinate is a speed: only k rows are inverted.
     """
-    inner = slope.shape[0]
-    late, eye = share[n:], jnp.eye(inner)[:, :, None]
+    late, eye = share[n:], jnp.eye(slope.shape[0])[:, :, None]
     by_place, by_rest = late * slope[:, :n], late * slope[:, n:]
     through = jnp.concatenate([share[:n, 0] * by_place, jnp.zeros_like(by_rest[:, n:])], axis=1)
     rest = invert_nodes(eye - by_rest - through)
-    by_place = multiply_nodes(rest, by_place)
-    places = jnp.eye(n)[:, :, None] + share[:n] * by_place[:n]
-    upper = jnp.concatenate([places, share[:n] * rest[:n]], axis=1)
-    return jnp.concatenate([upper, jnp.concatenate([by_place, rest], axis=1)])
+    return jnp.concatenate([multiply_nodes(rest, by_place), rest], axis=1)
 
 
 def step_defects(
@@ -294,15 +353,31 @@ def step_defects(
 
 def solve_linearised(layout: NodeOrder, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
     """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes, all in SI."""
-    dx = apply_nodes(lin.inverse, solve_recurrence(layout, lin.factors, defects))
-    return Trajectory(dx, imbalance + apply_nodes(lin.slope, dx))
+    change = solve_steps(layout, lin.factors, defects)
+    return Trajectory(change.x, imbalance + change.rate)
 
 
 def changed_initial_states(layout: Layout, lin: Linearised, change: Float[Array, "m D"]) -> Trajectory:
     """Changes (dx, dy) of windows that begin with a given state, by a ``change`` of that state [SI]; others stay."""
-    opened, first = list(layout.opened), layout.starts[list(layout.opened)]
-    inverse = jnp.moveaxis(lin.inverse[:, :, first], -1, 0)
-    begun = jnp.linalg.solve(inverse, change[:, opened].T[..., None])[..., 0].T
+    opened = list(layout.opened)
+    first = layout.starts[opened]
+    begun = _undone(steps_at(lin.factors, first), lin.factors.weight, change[:, opened])
     right = jnp.zeros((change.shape[0], layout.total)).at[:, layout.loose_ends].set(begun)
-    dx = apply_nodes(lin.inverse, _solve_opened(layout, lin.factors, right))
-    return Trajectory(dx, apply_nodes(lin.slope, dx))
+    found = _solve_opened(layout, lin.factors, right)
+    return Trajectory(found.x, found.rate)
+
+
+def steps_at(factors: CyclicFactors, nodes: NDArray[np.intp]) -> Steps:
+    """The steps at some of the nodes, one node after the other."""
+    chunk, place = np.divmod(nodes, CHUNK)
+    return Steps(*(jnp.moveaxis(each[place, ..., chunk], 0, -1) for each in factors.steps))
+
+
+def _undone(steps: Steps, weight: Float[Array, "m 1"], change: Float[Array, "m P"]) -> Float[Array, "m P"]:
+    """A_n dx_n for dx_n."""
+    rows, size = steps.lower.shape[:2]
+    n = size - rows
+    places = change[:n] - weight[:n] * steps.before * change[n : 2 * n]
+    left = change[n:] - apply_nodes(steps.lower[:, :n], places)
+    rest = jnp.linalg.solve(jnp.moveaxis(steps.lower[:, n:], -1, 0), left.T[..., None])[..., 0]
+    return jnp.concatenate([places, rest.T])

@@ -16,6 +16,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
 from savgs_ident.responses.windows import LEAD_S, estimate_whole_tests, estimate_windows
+from savgs_ident.simulate.collocation import step_matrices, steps_at
 from savgs_ident.simulate.compared_tests import Measurements, response_of_tests
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
@@ -215,7 +216,8 @@ def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray
     """
     places, layout = solution.excitation.windows, solution.mesh.layout
     here, windows, nodes = layout.nodes_of(places), places.size, layout.counts[places[0]]
-    steps = np.asarray(solution.linearised.factors.steps)[..., here]
+    factors = solution.linearised.factors
+    steps = np.asarray(step_matrices(steps_at(factors, here), factors.weight))
     by_node = np.moveaxis(steps.reshape(*steps.shape[:2], windows, nodes), (3, 2), (0, 1))
     phase = np.asarray(solution.mesh.phase)[here].reshape(windows, nodes)
     left = np.broadcast_to(np.eye(steps.shape[0]), by_node.shape[1:])

@@ -36,6 +36,7 @@ from savgs_ident.plants.base import AbstractPlant, Excitation, scale_of_time
 from savgs_ident.simulate.collocation import (
     CyclicFactors,
     Linearised,
+    Steps,
     Trajectory,
     blank_linearised,
     linearise,
@@ -83,8 +84,8 @@ class NewtonResult(NamedTuple):
 def newton_structure() -> PyTreeDef:
     """How the arrays of a result belong together."""
     zero = jnp.zeros(())
-    factors = CyclicFactors(zero, zero, zero)
-    result = NewtonResult(Trajectory(zero, zero), Linearised(zero, zero, zero, zero, factors), zero, zero)
+    factors = CyclicFactors(Steps(zero, zero, zero), zero, zero, zero)
+    result = NewtonResult(Trajectory(zero, zero), Linearised(zero, zero, factors), zero, zero)
     return jax.tree.structure(result)
 
 
@@ -256,7 +257,8 @@ def _solve(
 def blank_solution(model: AbstractPlant, excitation: Excitation, layout: Layout) -> PeriodicSolution:
     """What a solution looks like, of zeros: to have the programs compiled that take one."""
     lin = blank_linearised(model, layout)
-    inner, size, nodes = lin.slope.shape
+    inner, size = lin.factors.steps.lower.shape[1:3]
+    nodes = layout.total
     blank = PeriodicSolution(
         excitation=excitation,
         mesh=uniform_mesh(layout),

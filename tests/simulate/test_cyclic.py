@@ -1,6 +1,7 @@
 """Recurrences that close after one period, against one dense solve of everything."""
 
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +12,11 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 from numpy.typing import NDArray
 
+from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate import collocation
+from savgs_ident.simulate.collocation import Steps
+from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.mesh import CHUNK, Layout
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
 
@@ -28,89 +32,130 @@ LAYOUTS = (
 
 
 @partial(jax.jit, static_argnums=0)
-def _solve(layout: Layout, steps: Array, right: Array) -> Array:
-    return collocation.solve_recurrence(layout, collocation.factorise_recurrence(layout, steps), right)
+def _solve(layout: Layout, steps: Steps, weight: Array, right: Array) -> Array:
+    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, weight), right).x
 
 
 @partial(jax.jit, static_argnums=0)
-def _solve_many(layout: Layout, steps: Array, rights: Array) -> Array:
-    factors = collocation.factorise_recurrence(layout, steps)
-    return jax.lax.map(lambda right: collocation.solve_recurrence(layout, factors, right), rights)
+def _solve_many(layout: Layout, steps: Steps, weight: Array, rights: Array) -> Array:
+    factors = collocation.factorise_steps(layout, steps, weight)
+    return jax.lax.map(lambda right: collocation.solve_steps(layout, factors, right).x, rights)
 
 
 _invert_nodes = jax.jit(collocation.invert_nodes)
 
 
-def _dense(layout: Layout, steps: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """All x_n at once from x_{n+1} - M_n x_n = d_n, or x_0 = 0 from rest, the indices worked out here by hand."""
-    (size, total), right = right.shape, right.copy()
+def _dense(layout: Layout, drawn: "_Drawn") -> NDArray[np.float64]:
+    """All dx_n at once from A_{n+1} dx_{n+1} - B_n dx_n = d_n, the indices worked out here by hand.
+
+    What begins with a given state has A_0 dx_0 = 0.
+    """
+    (size, total), right = drawn.right.shape, drawn.right.copy()
     matrix = np.zeros((total, size, total, size))
     first = 0
     for number, count in enumerate(layout.counts):
         for place in range(count):
             here, after = first + place, first + (place + 1) % count
-            matrix[here, :, after, :] += np.eye(size)
+            matrix[here, :, after, :] += drawn.far[after]
             if after < here and number in layout.opened:
                 right[:, here] = 0.0
             else:
-                matrix[here, :, here, :] -= steps[:, :, here]
+                matrix[here, :, here, :] -= drawn.near[here]
         first += count
     flat = np.linalg.solve(matrix.reshape(total * size, -1), right.T.reshape(-1))
     return flat.reshape(total, size).T
 
 
-def _draw(seed: int, layout: Layout, size: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Step matrices of spectral norm ``radius``, turning and shearing, and right sides of unlike sizes."""
+class _Drawn(NamedTuple):
+    """Steps, the weights of their far ends, right sides, and A_n and B_n put together entry by entry, (P, m, m)."""
+
+    steps: Steps
+    weight: np.ndarray
+    right: np.ndarray
+    far: np.ndarray
+    near: np.ndarray
+
+    @property
+    def given(self) -> tuple[Steps, np.ndarray, np.ndarray]:
+        return self.steps, self.weight, self.right
+
+
+def _draw(seed: int, layout: Layout, places: int, states: int, decay: float) -> _Drawn:
+    """Steps of oscillators that are coupled and damped, some states slipping, and right sides of unlike sizes.
+
+    Everything decays by about ``decay`` in a node.
+    """
     rng = np.random.default_rng(seed)
-    drawn = rng.standard_normal((layout.total, size, size))
-    steps = radius * drawn / np.linalg.norm(drawn, 2, axis=(1, 2), keepdims=True)
-    right = rng.standard_normal((size, layout.total)) * 10.0 ** rng.uniform(-3.0, 3.0, (size, 1))
-    return np.moveaxis(steps, 0, -1), right
+    rows, size, total = places + states, 2 * places + states, layout.total
+    drawn = rng.standard_normal((total, rows, rows))
+    damping = decay * (np.eye(rows) + 0.2 * drawn / np.linalg.norm(drawn, 2, axis=(1, 2), keepdims=True))
+    flow = np.zeros((total, size, size))
+    flow[:, places:, places:] = -damping
+    flow[:, np.arange(places), places + np.arange(places)] = 1.0
+    flow[:, places : 2 * places, :places] = -rng.uniform(0.1, 0.4, (total, 1, 1)) * np.eye(places)
+    weight = np.concatenate([np.full(2 * places, 0.5), rng.choice([0.5, 1.0], states)])[:, None]
+    after = rng.uniform(0.5, 2.0, total)
+    before, eye = after[layout.preceding], np.eye(size)
+    far = eye - before[:, None, None] * weight * flow
+    near = eye + after[:, None, None] * (1.0 - weight) * flow
+    lower = np.moveaxis(np.linalg.inv(far)[:, places:], 0, -1)
+    right = rng.standard_normal((size, total)) * 10.0 ** rng.uniform(-3.0, 3.0, (size, 1))
+    return _Drawn(Steps(lower, before, after / before), weight, right, far, near)
 
 
 @given(
     seed=st.integers(0, 2**32 - 1),
     layout=st.sampled_from(LAYOUTS),
-    size=st.sampled_from((1, 5)),
-    radius=st.floats(0.0, 0.995),
+    kind=st.sampled_from(((0, 1), (1, 0), (2, 1), (0, 4))),
+    decay=st.floats(0.05, 1.0),
 )
-def test_it_solves_the_whole_cycle(seed: int, layout: Layout, size: int, radius: float) -> None:
-    steps, right = _draw(seed, layout, size, radius)
-    wanted = _dense(layout, steps, right)
-    found = np.asarray(_solve(layout, steps, right))
-    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-10 * np.max(np.abs(wanted)))
+def test_it_solves_the_whole_cycle(seed: int, layout: Layout, kind: tuple[int, int], decay: float) -> None:
+    drawn = _draw(seed, layout, *kind, decay)
+    wanted = _dense(layout, drawn)
+    found = np.asarray(_solve(layout, *drawn.given))
+    assert found == pytest.approx(wanted, rel=1e-8, abs=1e-9 * np.max(np.abs(wanted)))
 
 
 def test_growing_directions_are_solved_too_if_the_period_closes() -> None:
     """A rotation slightly off a period neither grows nor decays; only I - product must be regular."""
-    layout = Layout((CHUNK, 2 * CHUNK))
-    angle = 0.31
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    steps = np.repeat(turn[:, :, None], layout.total, axis=2)
+    layout, angle = Layout((CHUNK, 2 * CHUNK)), 0.31
+    # The trapezoidal rule turns an undamped oscillator by twice the arc tangent of half a step.
+    flow = 2.0 * np.tan(angle / 2.0) * np.array([[0.0, -1.0], [1.0, 0.0]])
+    far, near = np.eye(2) - 0.5 * flow, np.eye(2) + 0.5 * flow
+    ones = np.ones(layout.total)
+    steps = Steps(np.linalg.inv(far)[:, :, None] * ones, ones, ones)
     right = np.random.default_rng(1).standard_normal((2, layout.total))
-    found = np.asarray(_solve(layout, steps, right))
-    assert found == pytest.approx(_dense(layout, steps, right), rel=1e-10, abs=1e-11)
+    same = (layout.total, 1, 1)
+    drawn = _Drawn(steps, np.full((2, 1), 0.5), right, np.tile(far, same), np.tile(near, same))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    found = np.asarray(collocation.step_matrices(steps, drawn.weight))
+    assert found == pytest.approx(turn[:, :, None] * ones, abs=1e-14)
+    assert np.asarray(_solve(layout, *drawn.given)) == pytest.approx(
+        _dense(layout, drawn), rel=1e-10, abs=1e-11
+    )
 
 
 def test_one_factorisation_serves_many_right_sides() -> None:
     layout = LAYOUTS[2]
-    steps, first = _draw(3, layout, 5, 0.97)
-    _, second = _draw(4, layout, 5, 0.97)
+    drawn, other = (
+        _draw(3, layout, 2, 1, 0.1)._replace(right=_draw(s, layout, 2, 1, 0.1).right) for s in (3, 4)
+    )
+    first, second = drawn.right, other.right
     rights = np.stack([first, second, 2.0 * first - 3.0 * second, np.zeros_like(first)])
-    for right, found in zip(rights, np.asarray(_solve_many(layout, steps, rights)), strict=True):
-        wanted = _dense(layout, steps, right)
+    for right, found in zip(rights, np.asarray(_solve_many(layout, *drawn.given[:2], rights)), strict=True):
+        wanted = _dense(layout, drawn._replace(right=right))
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-10 * max(np.max(np.abs(wanted)), 1e-300))
 
 
 @pytest.mark.slow
 def test_dwells_do_not_see_each_other() -> None:
     layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK))
-    steps, right = _draw(5, layout, 4, 0.99)
-    whole = np.asarray(_solve(layout, steps, right))
+    drawn = _draw(5, layout, 1, 2, 0.05)
+    whole = np.asarray(_solve(layout, *drawn.given))
     for dwell, count in enumerate(layout.counts):
         mine = layout.dwell == dwell
-        alone = Layout((count,))
-        single = np.asarray(_solve(alone, steps[..., mine], right[:, mine]))
+        steps = Steps(*(each[..., mine] for each in drawn.steps))
+        single = np.asarray(_solve(Layout((count,)), steps, drawn.weight, drawn.right[:, mine]))
         np.testing.assert_allclose(whole[:, mine], single, rtol=1e-13, atol=1e-12)
 
 
@@ -143,19 +188,41 @@ def test_products_are_taken_node_by_node() -> None:
 
 @pytest.mark.slow
 def test_steps_of_a_sticking_motion_are_those_of_its_rates(
-    friction: QuarterCar, programme: PeriodicSolution
+    friction: QuarterCar, numbers: Values, programme: PeriodicSolution
 ) -> None:
     """A_n and B_n put together entry by entry, for states that slip and others, on nodes that are not even."""
-    lin, layout = programme.linearised, programme.mesh.layout
-    size, n = programme.trajectory.x.shape[0], len(friction.coordinates)
-    flow = np.concatenate([np.zeros((n, size, layout.total)), np.asarray(lin.slope)])
+    lin, layout, at = programme.linearised, programme.mesh.layout, programme.trajectory
+    size, n = at.x.shape[0], len(friction.coordinates)
+    flow = np.concatenate([np.zeros((n, size, layout.total)), _slopes(friction, numbers, programme)])
     flow[np.arange(n), n + np.arange(n)] = 1.0
     weight = np.asarray(collocation.implicitness(friction))[:, None]
     assert {*weight.ravel()} == {0.5, 1.0}
-    steps, eye = np.asarray(node_steps(programme.excitation, programme.mesh)), np.eye(size)[:, :, None]
-    far = np.moveaxis(eye - steps[layout.preceding] * weight * flow, -1, 0)
-    near = np.moveaxis(eye + steps * (1.0 - weight) * flow, -1, 0)
-    inverse = np.moveaxis(np.asarray(lin.inverse), -1, 0)
-    assert inverse @ far == pytest.approx(np.broadcast_to(np.eye(size), far.shape), abs=1e-8)
-    products = np.moveaxis(np.asarray(lin.factors.steps), -1, 0)
+    times, eye = np.asarray(node_steps(programme.excitation, programme.mesh)), np.eye(size)[:, :, None]
+    far = np.moveaxis(eye - times[layout.preceding] * weight * flow, -1, 0)
+    near = np.moveaxis(eye + times * (1.0 - weight) * flow, -1, 0)
+    steps = collocation.steps_at(lin.factors, np.arange(layout.total))
+    lower = np.moveaxis(np.asarray(steps.lower), -1, 0)
+    assert lower @ far == pytest.approx(np.broadcast_to(np.eye(size)[n:], lower.shape), abs=1e-8)
+    products = np.moveaxis(np.asarray(collocation.step_matrices(steps, lin.factors.weight)), -1, 0)
     assert products @ far == pytest.approx(near, rel=1e-8, abs=1e-8 * np.max(np.abs(near)))
+
+
+def _slopes(friction: QuarterCar, numbers: Values, solved: PeriodicSolution) -> NDArray[np.float64]:
+    """dy/dx at every node, (k, m, P), of the residual's own derivatives: nothing of the solver's."""
+    excitation, at = solved.excitation, solved.trajectory
+    u, prepared = inputs_at(friction, excitation, solved.mesh), friction.prepare(numbers)
+
+    def residual(x: Array, y: Array) -> Array:
+        return collocation.residual_at_nodes(friction, numbers, prepared, (*x, *y), u)
+
+    def along(place: int, which: int) -> Array:
+        still = [jnp.zeros_like(at.x), jnp.zeros_like(at.y)]
+        still[which] = still[which].at[place].set(1.0)
+        return jax.jvp(residual, (at.x, at.y), tuple(still))[1]
+
+    by_x, by_y = (
+        np.stack([np.asarray(along(place, which)) for place in range(each.shape[0])], axis=1)
+        for which, each in enumerate((at.x, at.y))
+    )
+    found = -np.linalg.solve(np.moveaxis(by_y, -1, 0), np.moveaxis(by_x, -1, 0))
+    return np.moveaxis(found, 0, -1)

@@ -14,6 +14,7 @@ from jaxtyping import Array
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate import collocation
+from savgs_ident.simulate.collocation import Steps
 from savgs_ident.simulate.mesh import CHUNK, Layout
 from savgs_ident.simulate.nearby import solve_near, worst_dwells
 from savgs_ident.simulate.periodic import PeriodicSolution, resolve
@@ -56,22 +57,28 @@ def test_a_part_holds_the_worst_dwells_whole(
 
 
 @partial(jax.jit, static_argnums=0)
-def _whole(layout: Layout, steps: Array, right: Array) -> Array:
-    return collocation.solve_recurrence(layout, collocation.factorise_recurrence(layout, steps), right)
+def _whole(layout: Layout, steps: Steps, right: Array) -> Array:
+    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, HALVES), right).x
 
 
 @partial(jax.jit, static_argnums=0)
-def _in_part(layout: Layout, left: Array, steps: Array, right: Array) -> tuple[Array, Array]:
+def _in_part(layout: Layout, left: Array, steps: Steps, right: Array) -> tuple[Array, Array]:
     part = worst_dwells(layout, left, 0.0, 4)
-    factors = collocation.factorise_recurrence(part, steps[:, :, part.nodes])
-    return part.write_to, collocation.solve_recurrence(part, factors, right[:, part.nodes])
+    some = Steps(*(each[..., part.nodes] for each in steps))
+    factors = collocation.factorise_steps(part, some, HALVES)
+    return part.write_to, collocation.solve_steps(part, factors, right[:, part.nodes]).x
+
+
+HALVES = np.full((3, 1), 0.5)
+"""Weights of three states of which none slips."""
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("worst", range(4))
 def test_a_part_is_solved_like_the_whole(layout: Layout, worst: int) -> None:
     random = np.random.default_rng(worst)
-    steps = 0.9 * np.eye(3)[:, :, None] + 0.1 * random.standard_normal((3, 3, layout.total))
+    lower = 0.9 * np.eye(3)[:, :, None] + 0.1 * random.standard_normal((3, 3, layout.total))
+    steps = Steps(lower, np.ones(layout.total), np.ones(layout.total))
     right = random.standard_normal((3, layout.total))
     left = np.roll([4.0, 3.0, 2.0, 1.0], worst)
     kept, found = (np.asarray(each) for each in _in_part(layout, jnp.asarray(left), steps, right))
