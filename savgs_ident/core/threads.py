@@ -1,9 +1,10 @@
 """Work in threads over all cores: compiled solvers, and readers in C, release Python's lock while they run."""
 
+import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 from savgs_ident.core.executor import cores
 
@@ -44,3 +45,29 @@ def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple
     with ThreadPoolExecutor(1) as pool:
         begun = pool.submit(other)
         return one(), begun.result()
+
+
+class computed_once(Generic[Result]):  # noqa: N801
+    """A property that is computed once for each object: threads that ask the same object for it meanwhile wait.
+
+    :func:`functools.cached_property` lets those wait that ask other objects, too, in Python 3.11, and computes it
+    more than once in later ones.
+    """
+
+    def __init__(self, compute: Callable[[Any], Result]):
+        self.__doc__ = compute.__doc__
+        self._compute, self._name = compute, compute.__name__
+        self._guard = threading.Lock()
+        self._working: dict[int, threading.Lock] = {}
+
+    def __get__(self, asked: Any, owner: type) -> Result:
+        known: dict[str, Result] = asked.__dict__
+        with self._guard:
+            lock = self._working.setdefault(id(asked), threading.Lock())
+        with lock:
+            try:
+                if self._name not in known:
+                    known[self._name] = self._compute(asked)
+            finally:
+                self._working.pop(id(asked), None)
+        return known[self._name]

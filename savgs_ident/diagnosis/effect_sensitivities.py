@@ -45,6 +45,10 @@ SAMPLES = 384
 PERIODS = 16
 """Periods of a dwell after which they repeat: what rang at the start has died away even in a slow frame."""
 
+REPEATED = 1e-9
+"""Change of every state in a period, relative to what it is then [1], from which on periods repeat: friction forgets
+its past in two."""
+
 PERIODS_OF_A_WINDOW = 2
 """The same of a window, which is long, and compared after a lead; one that begins with a given state has none."""
 
@@ -299,6 +303,15 @@ def _march_contact(
     return jax.vmap(march)(several)
 
 
+class _Marched(NamedTuple):
+    """States at the end of a period, (s,), what is wanted along it, (n, k), periods so far, whether they repeat."""
+
+    end: Array
+    along: Array
+    periods: Array
+    repeats: Array
+
+
 def _repeat(
     defect: Callable[..., Array],
     output: Callable[..., Array],
@@ -318,12 +331,21 @@ def _repeat(
             now = jax.lax.fori_loop(0, NEWTON_STEPS, better, before)
             return now, output(now, before, at, step)
 
-        def period(begun: Array, _: None) -> tuple[Array, Array]:
+        def period(begun: Array) -> tuple[Array, Array]:
             return jax.lax.scan(advance, begun, signals)
 
-        # All periods are kept and the last is taken: apart from the others it would be compiled once more.
-        every: Array = jax.lax.scan(period, jnp.zeros(size), length=periods)[1]
-        return every[-1]
+        def goes_on(now: _Marched) -> Array:
+            return (now.periods < periods) & ~now.repeats
+
+        def another(now: _Marched) -> _Marched:
+            end, along = period(now.end)
+            moved, most = jnp.abs(end - now.end), jnp.abs(end)
+            return _Marched(end, along, now.periods + 1, jnp.all(moved <= REPEATED * most))
+
+        begin = jnp.zeros(size)
+        blank = jax.tree.map(lambda each: jnp.zeros(each.shape), jax.eval_shape(period, begin)[1])
+        first = _Marched(begin, blank, jnp.zeros((), int), jnp.asarray(False))
+        return jax.lax.while_loop(goes_on, another, first).along
 
     return jax.vmap(one_dwell)(signals, steps)
 

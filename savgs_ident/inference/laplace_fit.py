@@ -6,13 +6,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
+from savgs_ident.core.threads import computed_once
 from savgs_ident.inference.laplace import covariance_over_discrepancies
 from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data, Plant, Prediction
@@ -90,7 +90,7 @@ class Search:
         """Measured less predicted [unit of the row], (m,)."""
         return self.data.measured - prediction.rows
 
-    @cached_property
+    @computed_once
     def part(self) -> Data:
         """The data that count."""
         return self.data.part(self.mask)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from savgs_ident.core.status import Status
+from savgs_ident.core.threads import computed_once
 from savgs_ident.inference.prior import Coordinates, EffectCoordinates, Scales
 
 MULTIPLES = (0.4, 1.0, 2.5)
@@ -43,7 +44,7 @@ class Prediction:
     status: Status
     warm_start: Any
 
-    @cached_property
+    @computed_once
     def slopes(self) -> NDArray[np.float64]:
         """Slopes of the rows in the named values [units of the rows per unit of the value], (m, n)."""
         return self.find_slopes()
@@ -187,7 +188,7 @@ class Data:
             None if self.nuisance is None else self.nuisance[mask],
         )
 
-    @cached_property
+    @computed_once
     def independent(self) -> "Data":
         """The numbers turned into axes in which neither noise nor discrepancy is shared."""
         if not self._share:
@@ -240,7 +241,7 @@ class Data:
         sizes = np.linalg.lstsq(whitened, (missed.T * weight).T)[0]
         return np.asarray(self.nuisance @ sizes)
 
-    @cached_property
+    @computed_once
     def left_by_nuisances(self) -> NDArray[np.float64]:
         """The share of the noise's variance of each number that nuisances leave [1], (m,): m - s in all."""
         if self.nuisance is None:
@@ -252,7 +253,7 @@ class Data:
     def _share(self) -> bool:
         return any(each is not None for each in (self.shared, self.tolerated, self.nuisance))
 
-    @cached_property
+    @computed_once
     def _axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Discrepancy scales (m,) along the principal axes, in noise sd, and what turns the numbers there, (m, m).
 
