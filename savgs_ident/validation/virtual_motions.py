@@ -1,9 +1,10 @@
 """Motions of the rig by integration in time, from rest: steady dwells of the cam, and a sweep.
 
-What a trial records comes from here, not from the collocation that models are fitted with. The cam's lift grows to
-its height during the first second, and then its speed changes from dwell to dwell, with the cam at its top each time.
-Every dwell runs until the states at the ends of two stretches agree; then one period is kept. What follows in a dwell
-repeats that period; the sensors' own dynamics, which are linear, act on its harmonics.
+What a trial records comes from here, not from the collocation that models are fitted with. Every dwell begins with
+the rig at rest, and the cam's lift grows to its height during the first second. It runs until the states at the ends
+of two stretches agree; then one period is kept. What follows in a dwell repeats that period; the sensors' own
+dynamics, which are linear, act on its harmonics. All dwells are integrated side by side, each with steps of its own:
+one after the other they would take ten times as long.
 
 The integration controls its error, or has a fixed step: the truth of foreign trials is integrated by the classical
 method of Runge and Kutta (:func:`integrate_fixed`), the accelerations at every stage being the root of the plant's
@@ -12,10 +13,11 @@ residual. So it shares no method with the diagnosis nor with other virtual campa
 Source: Kutta 1901, Zeitschrift fuer Mathematik und Physik 46.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -94,52 +96,126 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
     )
 
 
+class _Dwells(NamedTuple):
+    """D dwells side by side: parameters [SI], (D,) each, frequencies [Hz], (D,), and what is the same in all.
+
+    ``lift`` of the cam [m] and ``angle`` of the link [rad].
+    """
+
+    p: Values
+    frequency: Float[Array, " D"]
+    lift: Array
+    angle: Array
+
+
+class _Stretch(NamedTuple):
+    """Packed states at the end, (D, x), readings on the way, (D, C, n), in SI, whether it ended, and well, (D,)."""
+
+    end: Array
+    readings: Array
+    stopped: Array
+    ok: Array
+
+    def status(self, dwell: int) -> Status:
+        """How one of the dwells ended."""
+        finite = (np.isfinite(np.asarray(each[dwell])).all() for each in (self.end, self.readings))
+        if self.stopped[dwell]:
+            return Status.MAX_ITERATIONS
+        return Status.CONVERGED if self.ok[dwell] and all(finite) else Status.NOT_FINITE
+
+
 def steady_dwells(
     model: QuarterCar, during: Sequence[Values], frequencies: tuple[float, ...], step: float = 0.0
-) -> Iterator[Steady]:
-    """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle.
+) -> list[Steady]:
+    """The steady motions of the rig in dwells [Hz], with a link held at its nominal angle.
 
     ``during`` are the parameters [SI] in each; ``step`` [s] is that of a fixed-step integration, 0 for one that
     controls its error.
     """
-    mechanics = without_sensor_faults(model)
-    _, angle = nominal_test(during[0])
-    state, rise = _at_rest(mechanics, during[0], placed(held_link(angle))), STRETCH
-    for frequency, p in zip(frequencies, during, strict=True):
-        status = Status.MAX_ITERATIONS
-        for _ in range(ceil(PATIENCE / STRETCH)):
-            periods = ceil(STRETCH * frequency)
-            before, (state, _, ended) = state, _stretch(mechanics, p, state, frequency, periods, rise, step)
-            rise = 0.0
-            if not ended.ok or _apart(mechanics, before, state) < CLOSED:
-                status = ended
-                break
-        state, truth, ended = _stretch(mechanics, p, state, frequency, 1, rise, step)
-        yield Steady(frequency, _shown(model, p, frequency, truth), joint_status((status, ended)))
+    mechanics, hertz = without_sensor_faults(model), np.array(frequencies)
+    lift, angle = nominal_test(during[0])
+    p = {name: jnp.stack([jnp.asarray(each[name]) for each in during]) for name in during[0]}
+    dwells = placed(_Dwells(p, jnp.asarray(hertz), jnp.asarray(lift), jnp.asarray(angle)))
+    rest = _at_rest(mechanics, during[0], placed(held_link(angle)))
+    state, rise = jnp.broadcast_to(rest, (hertz.size, rest.size)), STRETCH
+    settled, status = np.zeros(hertz.size, np.bool_), [Status.MAX_ITERATIONS] * hertz.size
+    for _ in range(ceil(PATIENCE / STRETCH)):
+        along = _stretch(mechanics, dwells, state, np.ceil(STRETCH * hertz), rise, 1, step)
+        ended = [along.status(dwell) for dwell in range(hertz.size)]
+        closed = _apart(mechanics, state, along.end) < CLOSED
+        new = ~settled & (closed | ~np.array([each.ok for each in ended]))
+        status = [there if now else known for there, now, known in zip(ended, new, status, strict=True)]
+        settled, state, rise = settled | new, along.end, 0.0
+        if settled.all() or not all(each.ok for each in ended):
+            break
+    kept = _stretch(mechanics, dwells, state, np.ones(hertz.size), rise, SAMPLES, step)
+    return [
+        Steady(
+            f, _shown(model, each, f, np.asarray(kept.readings[d])), joint_status((status[d], kept.status(d)))
+        )
+        for d, (f, each) in enumerate(zip(frequencies, during, strict=True))
+    ]
 
 
-def _apart(model: QuarterCar, before: Array, after: Array) -> float:
-    """Largest difference of two packed states, of their typical sizes."""
+def _apart(model: QuarterCar, before: Array, after: Array) -> NDArray[np.float64]:
+    """Largest difference of packed states in each dwell, of their typical sizes, (D,)."""
     scale = np.array(state_sizes(model))
-    return float(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale))
+    return np.asarray(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale, axis=1))
 
 
 def _stretch(
-    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float, step: float
-) -> tuple[Array, NDArray[np.float64], Status]:
-    """The packed state after so many periods, what was read on the way, (2, SAMPLES), and how it ended.
+    model: QuarterCar,
+    dwells: _Dwells,
+    start: Array,
+    periods: NDArray[np.float64],
+    rise: float,
+    samples: int,
+    step: float,
+) -> _Stretch:
+    """So many periods of every dwell, (D,), from packed states, (D, x), with readings at evenly spaced ``samples``.
 
     The cam's lift grows to its height during the first ``rise`` [s].
     """
-    lift, angle = nominal_test(p)
+    durations = periods / np.asarray(dwells.frequency)
+    start, lasts, rising = placed((start, jnp.asarray(durations), jnp.asarray(rise)))
     if step > 0.0:
-        source = placed(RigSource(cam_road(lift, frequency, rise), held_link(angle)))
-        end, readings, status = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
-        return end, np.asarray(readings), status
-    times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
-    drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
-    end, readings, found = _integrated(model, p, start, *placed(drive))
-    return end, np.asarray(readings), _status_of(found, end, readings)
+        inner = jnp.asarray([substeps_for(each, samples, step) for each in durations.tolist()])
+        end, readings = _all_stepped(model, dwells, start, lasts, rising, placed(inner), samples)
+        return _Stretch(end, readings, *np.array([[False], [True]]).repeat(len(durations), axis=1))
+    return _Stretch(*_all_integrated(model, dwells, start, lasts, rising, samples))
+
+
+@eqx.filter_jit
+def _all_stepped(
+    model: QuarterCar,
+    dwells: _Dwells,
+    start: Array,
+    duration: Array,
+    rise: Array,
+    inner: Array,
+    samples: int,
+) -> tuple[Array, Array]:
+    def one(p: Values, frequency: Array, start: Array, duration: Array, inner: Array) -> tuple[Array, Array]:
+        source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
+        return _stepped(model, p, start, source, duration / samples, inner, samples)
+
+    return jax.vmap(one)(dwells.p, dwells.frequency, start, duration, inner)
+
+
+# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
+@eqx.filter_jit
+def _all_integrated(
+    model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array, samples: int
+) -> tuple[Array, Array, Array, Array]:
+    def one(p: Values, frequency: Array, start: Array, duration: Array) -> tuple[Array, Array, Array, Array]:
+        source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
+        times = jnp.linspace(0.0, duration, samples + 1)
+        found = simulate_transient(model, p, source, times, unpack_state(model, start), PRECISION)
+        ends = (RESULTS.max_steps_reached, RESULTS.successful)
+        stopped, ok = (jnp.asarray(found.result == each) for each in ends)
+        return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], stopped, ok
+
+    return jax.vmap(one)(dwells.p, dwells.frequency, start, duration)
 
 
 def _status_of(found: RESULTS, *numbers: Array) -> Status:
@@ -153,15 +229,6 @@ def _status_of(found: RESULTS, *numbers: Array) -> Status:
 @eqx.filter_jit
 def _at_rest(model: QuarterCar, p: Values, link: ImposedLink) -> Array:
     return pack_state(rest_state(model, p, RigSource(flat_road(), link), jnp.zeros(())))
-
-
-# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
-@eqx.filter_jit
-def _integrated(
-    model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array, RESULTS]:
-    found = simulate_transient(model, p, RigSource(road, link), times, unpack_state(model, start), PRECISION)
-    return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], found.result
 
 
 @eqx.filter_jit

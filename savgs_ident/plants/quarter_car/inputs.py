@@ -25,7 +25,15 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Fundamental
 from savgs_ident.plants.base import AbstractSource, Excitation
-from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Sine, SweptAngle, tabulated
+from savgs_ident.plants.profiles import (
+    AbstractProfile,
+    Constant,
+    LinearSweep,
+    Number,
+    Sine,
+    SweptAngle,
+    tabulated,
+)
 from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.plant import Loads, QuarterCar
 
@@ -76,7 +84,7 @@ def flat_road() -> RoadMotion:
     return RoadMotion(Constant(0.0))
 
 
-def cam_road(peak_to_peak: float, frequency: float, rise_time: float = 0.0) -> RoadMotion:
+def cam_road(peak_to_peak: Number, frequency: Number, rise_time: Number = 0.0) -> RoadMotion:
     """A cam of height ``peak_to_peak`` [m] at ``frequency`` [Hz], highest at t = 0.
 
     Its lift grows smoothly from nothing during the first ``rise_time`` [s].
@@ -159,7 +167,7 @@ class ImposedLink(AbstractActuation):
         return jnp.zeros(0)
 
 
-def held_link(angle: float) -> ImposedLink:
+def held_link(angle: Number) -> ImposedLink:
     """A rigid link at ``angle`` [rad]."""
     return ImposedLink(Constant(angle))
 
