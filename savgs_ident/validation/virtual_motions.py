@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -44,7 +44,7 @@ from savgs_ident.plants.quarter_car.inputs import (
     sweep_road,
 )
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.transient import (
     PlantState,
     pack_state,
@@ -109,19 +109,23 @@ class _Dwells(NamedTuple):
 
 
 class _Stretch(NamedTuple):
-    """Packed states at the end, (D, x), readings on the way, (D, C, n), in SI, whether it ended, and well, (D,)."""
+    """Packed states at the end, (D, x), and readings on the way, (D, C, n), in SI, and how it ended, (D,).
 
-    end: Array
-    readings: Array
-    stopped: Array
-    ok: Array
+    ``stopped`` is whether it took too many steps, ``ok`` whether the integration says that it is right.
+    """
 
-    def status(self, dwell: int) -> Status:
-        """How one of the dwells ended."""
-        finite = (np.isfinite(np.asarray(each[dwell])).all() for each in (self.end, self.readings))
-        if self.stopped[dwell]:
-            return Status.MAX_ITERATIONS
-        return Status.CONVERGED if self.ok[dwell] and all(finite) else Status.NOT_FINITE
+    end: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    stopped: NDArray[np.bool_]
+    ok: NDArray[np.bool_]
+
+    def statuses(self) -> list[Status]:
+        """How each dwell ended."""
+        finite = np.isfinite(self.end).all(axis=1) & np.isfinite(self.readings).all(axis=(1, 2))
+        return [
+            Status.MAX_ITERATIONS if stopped else Status.CONVERGED if ok else Status.NOT_FINITE
+            for stopped, ok in zip(self.stopped, self.ok & finite, strict=True)
+        ]
 
 
 def steady_dwells(
@@ -134,86 +138,80 @@ def steady_dwells(
     """
     mechanics, hertz = without_sensor_faults(model), np.array(frequencies)
     lift, angle = nominal_test(during[0])
-    p = {name: jnp.stack([jnp.asarray(each[name]) for each in during]) for name in during[0]}
-    dwells = placed(_Dwells(p, jnp.asarray(hertz), jnp.asarray(lift), jnp.asarray(angle)))
+    stacked = {name: jnp.stack([jnp.asarray(each[name]) for each in during]) for name in during[0]}
+    dwells = placed(_Dwells(stacked, jnp.asarray(hertz), jnp.asarray(lift), jnp.asarray(angle)))
     rest = _at_rest(mechanics, during[0], placed(held_link(angle)))
-    state, rise = jnp.broadcast_to(rest, (hertz.size, rest.size)), STRETCH
+    state, rise = np.broadcast_to(np.asarray(rest), (hertz.size, rest.size)), STRETCH
     settled, status = np.zeros(hertz.size, np.bool_), [Status.MAX_ITERATIONS] * hertz.size
     for _ in range(ceil(PATIENCE / STRETCH)):
-        along = _stretch(mechanics, dwells, state, np.ceil(STRETCH * hertz), rise, 1, step)
-        ended = [along.status(dwell) for dwell in range(hertz.size)]
+        along = _stretch(mechanics, dwells, state, np.ceil(STRETCH * hertz), rise, step)
+        ended = along.statuses()
         closed = _apart(mechanics, state, along.end) < CLOSED
         new = ~settled & (closed | ~np.array([each.ok for each in ended]))
         status = [there if now else known for there, now, known in zip(ended, new, status, strict=True)]
         settled, state, rise = settled | new, along.end, 0.0
         if settled.all() or not all(each.ok for each in ended):
             break
-    kept = _stretch(mechanics, dwells, state, np.ones(hertz.size), rise, SAMPLES, step)
-    return [
-        Steady(
-            f, _shown(model, each, f, np.asarray(kept.readings[d])), joint_status((status[d], kept.status(d)))
-        )
-        for d, (f, each) in enumerate(zip(frequencies, during, strict=True))
-    ]
+    kept = _stretch(mechanics, dwells, state, np.ones(hertz.size), rise, step)
+    dwell = zip(frequencies, during, kept.readings, status, kept.statuses(), strict=True)
+    return [Steady(f, _shown(model, p, f, truth), joint_status(how)) for f, p, truth, *how in dwell]
 
 
-def _apart(model: QuarterCar, before: Array, after: Array) -> NDArray[np.float64]:
+def _apart(model: QuarterCar, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest difference of packed states in each dwell, of their typical sizes, (D,)."""
     scale = np.array(state_sizes(model))
-    return np.asarray(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale, axis=1))
+    return np.asarray(np.max(np.abs(after - before) / scale, axis=1))
 
 
 def _stretch(
     model: QuarterCar,
     dwells: _Dwells,
-    start: Array,
+    start: NDArray[np.float64],
     periods: NDArray[np.float64],
     rise: float,
-    samples: int,
     step: float,
 ) -> _Stretch:
-    """So many periods of every dwell, (D,), from packed states, (D, x), with readings at evenly spaced ``samples``.
+    """So many periods of every dwell, (D,), from packed states, (D, x), with readings at :data:`SAMPLES` instants.
 
     The cam's lift grows to its height during the first ``rise`` [s].
     """
     durations = periods / np.asarray(dwells.frequency)
-    start, lasts, rising = placed((start, jnp.asarray(durations), jnp.asarray(rise)))
+    begin, lasts, rising = placed((jnp.asarray(start), jnp.asarray(durations), jnp.asarray(rise)))
     if step > 0.0:
-        inner = jnp.asarray([substeps_for(each, samples, step) for each in durations.tolist()])
-        end, readings = _all_stepped(model, dwells, start, lasts, rising, placed(inner), samples)
-        return _Stretch(end, readings, *np.array([[False], [True]]).repeat(len(durations), axis=1))
-    return _Stretch(*_all_integrated(model, dwells, start, lasts, rising, samples))
+        inner = jnp.asarray([substeps_for(each, SAMPLES, step) for each in durations.tolist()])
+        end, readings = map(np.asarray, _all_stepped(model, dwells, begin, lasts, rising, placed(inner)))
+        return _Stretch(end, readings, stopped=np.zeros(len(end), bool), ok=np.ones(len(end), bool))
+    return _Stretch(*map(np.asarray, _all_integrated(model, dwells, begin, lasts, rising)))
 
 
 @eqx.filter_jit
-def _all_stepped(
-    model: QuarterCar,
-    dwells: _Dwells,
-    start: Array,
-    duration: Array,
-    rise: Array,
-    inner: Array,
-    samples: int,
-) -> tuple[Array, Array]:
+def _all_stepped(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_step_all, *args)
+
+
+def _step_all(
+    model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array, inner: Array
+) -> tuple[Array, ...]:
     def one(p: Values, frequency: Array, start: Array, duration: Array, inner: Array) -> tuple[Array, Array]:
         source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
-        return _stepped(model, p, start, source, duration / samples, inner, samples)
+        return _stepped(model, p, start, source, duration / SAMPLES, inner, SAMPLES)
 
     return jax.vmap(one)(dwells.p, dwells.frequency, start, duration, inner)
 
 
-# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
+# Compiled as a whole: what prepares an integration would take longer than the integration, step by step. It cannot be
+# kept: it calls back to Python where an error is found.
 @eqx.filter_jit
 def _all_integrated(
-    model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array, samples: int
-) -> tuple[Array, Array, Array, Array]:
-    def one(p: Values, frequency: Array, start: Array, duration: Array) -> tuple[Array, Array, Array, Array]:
+    model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array
+) -> tuple[Array, ...]:
+    def one(p: Values, frequency: Array, start: Array, duration: Array) -> tuple[Array, ...]:
         source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
-        times = jnp.linspace(0.0, duration, samples + 1)
+        times = jnp.linspace(0.0, duration, SAMPLES + 1)
         found = simulate_transient(model, p, source, times, unpack_state(model, start), PRECISION)
         ends = (RESULTS.max_steps_reached, RESULTS.successful)
-        stopped, ok = (jnp.asarray(found.result == each) for each in ends)
-        return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], stopped, ok
+        how = (jnp.asarray(found.result == each) for each in ends)
+        return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], *how
 
     return jax.vmap(one)(dwells.p, dwells.frequency, start, duration)
 

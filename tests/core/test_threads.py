@@ -1,11 +1,12 @@
 """What is made in threads: in order, one ahead, and with what it raises."""
 
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
 
-from savgs_ident.core.threads import beside, one_ahead
+from savgs_ident.core.threads import beside, computed_once, in_parallel, one_ahead, side_by_side
 
 
 def test_items_come_in_order_from_another_thread_one_ahead() -> None:
@@ -57,3 +58,41 @@ def test_work_beside_is_done_at_the_end_and_what_it_raises_is_not_raised() -> No
     with beside(lambda: 1 / 0):
         done.append(2)
     assert done == [1, 2]
+
+
+class _Asked:
+    def __init__(self, work: threading.Barrier | None = None) -> None:
+        self.work, self.times = work, 0
+
+    @computed_once
+    def number(self) -> int:
+        """How often it was computed."""
+        self.times += 1
+        if self.work is None:
+            time.sleep(0.05)
+        else:
+            self.work.wait(timeout=10.0)
+        return self.times
+
+
+def test_what_is_computed_once_is_waited_for_by_those_who_ask_the_same_object() -> None:
+    asked = _Asked()
+    assert in_parallel(lambda each: each.number, [asked] * 8) == [1] * 8
+    assert asked.number == 1
+
+
+def test_other_objects_are_not_waited_for() -> None:
+    """Each of two waits until both are at work: one after the other they would never end."""
+    both = threading.Barrier(2)
+    one, other = _Asked(both), _Asked(both)
+    assert side_by_side(lambda: one.number, lambda: other.number) == (1, 1)
+
+
+def test_what_computing_raises_is_raised_and_computed_anew_when_asked_again() -> None:
+    asked = _Asked(threading.Barrier(2))
+    assert asked.work is not None
+    asked.work.abort()
+    with pytest.raises(threading.BrokenBarrierError):
+        _ = asked.number
+    asked.work = None
+    assert asked.number == 2
