@@ -210,7 +210,9 @@ def _is_text(statement: ast.stmt | None) -> bool:
 
 
 def _is_property(node: ast.FunctionDef) -> bool:
-    return any(ast.unparse(each) in ("property", "cached_property") for each in node.decorator_list)
+    return any(
+        ast.unparse(each) in ("property", "cached_property", "computed_once") for each in node.decorator_list
+    )
 
 
 def as_text(lines: list[str]) -> list[str]:

@@ -58,16 +58,28 @@ class computed_once(Generic[Result]):  # noqa: N801
         self.__doc__ = compute.__doc__
         self._compute, self._name = compute, compute.__name__
         self._guard = threading.Lock()
-        self._working: dict[int, threading.Lock] = {}
+        self._asking: dict[int, tuple[threading.RLock, int]] = {}
 
     def __get__(self, asked: Any, owner: type) -> Result:
+        if asked is None:
+            raise AttributeError(f"{owner.__name__}.{self._name} is known of objects only")
         known: dict[str, Result] = asked.__dict__
-        with self._guard:
-            lock = self._working.setdefault(id(asked), threading.Lock())
-        with lock:
-            try:
-                if self._name not in known:
-                    known[self._name] = self._compute(asked)
-            finally:
-                self._working.pop(id(asked), None)
+        with self._waiting_for(id(asked)):
+            if self._name not in known:
+                known[self._name] = self._compute(asked)
         return known[self._name]
+
+    @contextmanager
+    def _waiting_for(self, key: int) -> Iterator[None]:
+        """With the lock of an object, which is there as long as anybody asks for it."""
+        with self._guard:
+            lock, asking = self._asking.get(key, (threading.RLock(), 0))
+            self._asking[key] = lock, asking + 1
+        try:
+            with lock:
+                yield
+        finally:
+            with self._guard:
+                lock, asking = self._asking.pop(key)
+                if asking > 1:
+                    self._asking[key] = lock, asking - 1

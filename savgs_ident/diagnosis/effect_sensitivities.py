@@ -43,18 +43,19 @@ SAMPLES = 384
 """Instants of a dwell's period along which states are marched; of a window as many as it has nodes."""
 
 PERIODS = 16
-"""Periods of a dwell after which they repeat: what rang at the start has died away even in a slow frame."""
-
-REPEATED = 1e-9
-"""Change of every state in a period, relative to what it is then [1], from which on periods repeat: friction forgets
-its past in two."""
+"""Most periods of a dwell until they repeat: what rang at the start has died away even in a slow frame."""
 
 PERIODS_OF_A_WINDOW = 2
 """The same of a window, which is long, and compared after a lead; one that begins with a given state has none."""
 
 
+REPEATED = 1e-9
+"""Change of every state in a period, relative to what it is then [1], from which on periods repeat: friction forgets
+its past in two."""
+
+
 class AlikeTests(NamedTuple):
-    """Tests along which states are marched alike: their places, instants in a period, and periods."""
+    """Tests along which states are marched alike: their places, instants in a period, and periods at most."""
 
     places: tuple[int, ...]
     instants: int
@@ -320,7 +321,10 @@ def _repeat(
     steps: Float[Array, " d"],
     periods: int,
 ) -> Float[Array, "d n k"]:
-    """``output`` along the last of several periods; ``defect`` vanishes for the state at the end of a step."""
+    """``output`` along the last of several periods, or the first that repeats the one before.
+
+    ``defect`` vanishes for the state at the end of a step.
+    """
 
     def one_dwell(signals: Any, step: Array) -> Array:
         def advance(before: Array, at: Any) -> tuple[Array, Array]:
@@ -343,8 +347,8 @@ def _repeat(
             return _Marched(end, along, now.periods + 1, jnp.all(moved <= REPEATED * most))
 
         begin = jnp.zeros(size)
-        blank = jax.tree.map(lambda each: jnp.zeros(each.shape), jax.eval_shape(period, begin)[1])
-        first = _Marched(begin, blank, jnp.zeros((), int), jnp.asarray(False))
+        _, along = jax.eval_shape(period, begin)
+        first = _Marched(begin, jnp.zeros(along.shape, along.dtype), jnp.zeros((), int), jnp.asarray(False))
         return jax.lax.while_loop(goes_on, another, first).along
 
     return jax.vmap(one_dwell)(signals, steps)

@@ -168,11 +168,9 @@ class Data:
         if mask.all():
             return self
         which = np.packbits(mask).tobytes()
-        if which not in self._parts:
-            self._parts[which] = self._picked(mask)
-        return self._parts[which]
+        return self._parts.get(which) or self._parts.setdefault(which, self._picked(mask))
 
-    @cached_property
+    @computed_once
     def _parts(self) -> dict[bytes, "Data"]:
         return {}
 

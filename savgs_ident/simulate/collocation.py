@@ -17,13 +17,13 @@ only:
     a_{n+1} = M_n a_n + d_n,    a_N = a_0.
 
 M_n is never formed (:func:`_one_step`). A_n and B_n are the same but for the time step, so that dx_n, which is wanted
-anyway, gives M_n a_n = dx_n + r_n (dx_n - a_n); and the rate of a coordinate is a speed, so that of A_n^-1 only the
-k rows of speeds and internal states are multiplied. The recurrence is solved dwell by dwell
-(:func:`factorise_steps`, :func:`solve_steps`). Eliminating from node to node is stable because a rig forgets its past
-(the products of M_n shrink). Products are formed in chunks, all chunks of all dwells at a time, then over the chunks
-of a dwell; the period closes with (I - M_{N-1} ... M_0) a_0 = d. A window that begins with a given state does not
-close: with M_{N-1} = 0 and d_{N-1} = 0 its first state stays as it is. The factorisation serves any number of right
-sides, which is what makes sensitivities cheap.
+anyway, gives M_n a_n = dx_n + r_n (dx_n - a_n) with r_n = h_n (1 - g) / (h_{n-1} g); and the rate of a coordinate is
+a speed, so that of A_n^-1 only the k rows of speeds and internal states are multiplied. The recurrence is solved
+dwell by dwell (:func:`factorise_steps`, :func:`solve_steps`). Eliminating from node to node is stable because a rig
+forgets its past (the products of M_n shrink). Products are formed in chunks, all chunks of all dwells at a time, then
+over the chunks of a dwell; the period closes with (I - M_{N-1} ... M_0) a_0 = d. A window that begins with a given
+state does not close: with M_{N-1} = 0 and d_{N-1} = 0 its first state stays as it is. The factorisation serves any
+number of right sides, which is what makes sensitivities cheap.
 
 Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
 a long vector.
@@ -128,7 +128,7 @@ def _opened(layout: NodeOrder, values: Float[Array, "*k P"]) -> Float[Array, "*k
 
 
 class _Stepped(NamedTuple):
-    """What one step makes of a_n, (m, j, P): dx_n, dx_n's rate from a state of no imbalance, (k, j, P), M_n a_n."""
+    """What one step makes of a_n, (m, j, P): dx_n, J dx_n, (k, j, P), and M_n a_n."""
 
     change: Array
     rate: Array
@@ -136,6 +136,7 @@ class _Stepped(NamedTuple):
 
 
 def _one_step(steps: Steps, weight: Float[Array, "m 1"], a: Float[Array, "m j P"]) -> _Stepped:
+    """The last k rows of dx are those of A^-1 a, the first dq = a_q + h g dqd; and J dx = (dx - a) / (h g)."""
     rows, size = steps.lower.shape[:2]
     n, late = size - rows, weight[:, None] * steps.before
     rest = multiply_nodes(steps.lower, a)
@@ -179,7 +180,7 @@ def _loose_chunks(layout: NodeOrder) -> Array | None:
 
 
 class Changes(NamedTuple):
-    """dx_n at the nodes, (m, P), and how fast it changes beside what is imposed, slope dx_n, (k, P); SI."""
+    """dx_n at the nodes, (m, P), and J dx_n, which is dy_n less its imbalance, (k, P); SI."""
 
     x: Float[Array, "m P"]
     rate: Float[Array, "k P"]
@@ -361,7 +362,7 @@ def changed_initial_states(layout: Layout, lin: Linearised, change: Float[Array,
     """Changes (dx, dy) of windows that begin with a given state, by a ``change`` of that state [SI]; others stay."""
     opened = list(layout.opened)
     first = layout.starts[opened]
-    begun = _undone(steps_at(lin.factors, first), lin.factors.weight, change[:, opened])
+    begun = undone(steps_at(lin.factors, first), lin.factors.weight, change[:, opened])
     right = jnp.zeros((change.shape[0], layout.total)).at[:, layout.loose_ends].set(begun)
     found = _solve_opened(layout, lin.factors, right)
     return Trajectory(found.x, found.rate)
@@ -373,8 +374,8 @@ def steps_at(factors: CyclicFactors, nodes: NDArray[np.intp]) -> Steps:
     return Steps(*(jnp.moveaxis(each[place, ..., chunk], 0, -1) for each in factors.steps))
 
 
-def _undone(steps: Steps, weight: Float[Array, "m 1"], change: Float[Array, "m P"]) -> Float[Array, "m P"]:
-    """A_n dx_n for dx_n."""
+def undone(steps: Steps, weight: Float[Array, "m 1"], change: Float[Array, "m P"]) -> Float[Array, "m P"]:
+    """A_n dx_n for dx_n [units of the states]: what a step divides by undone."""
     rows, size = steps.lower.shape[:2]
     n = size - rows
     places = change[:n] - weight[:n] * steps.before * change[n : 2 * n]

@@ -4,10 +4,10 @@ What a trial records comes from here, not from the collocation that models are f
 the rig at rest, and the cam's lift grows to its height during the first second. It runs until the states at the ends
 of two stretches agree; then one period is kept. What follows in a dwell repeats that period; the sensors' own
 dynamics, which are linear, act on its harmonics. All dwells are integrated side by side, each with steps of its own:
-one after the other they would take ten times as long.
+one after the other they take three to five times as long.
 
 The integration controls its error, or has a fixed step: the truth of foreign trials is integrated by the classical
-method of Runge and Kutta (:func:`integrate_fixed`), the accelerations at every stage being the root of the plant's
+method of Runge and Kutta (:func:`_stepped`), the accelerations at every stage being the root of the plant's
 residual. So it shares no method with the diagnosis nor with other virtual campaigns.
 
 Source: Kutta 1901, Zeitschrift fuer Mathematik und Physik 46.
@@ -97,15 +97,16 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
 
 
 class _Dwells(NamedTuple):
-    """D dwells side by side: parameters [SI], (D,) each, frequencies [Hz], (D,), and what is the same in all.
-
-    ``lift`` of the cam [m] and ``angle`` of the link [rad].
-    """
+    """D dwells: parameters [SI], frequencies [Hz], the cam's lift [m], and the link's angle [rad], (D,) each."""
 
     p: Values
     frequency: Float[Array, " D"]
-    lift: Array
-    angle: Array
+    lift: Float[Array, " D"]
+    angle: Float[Array, " D"]
+
+    def source(self, rise: Array) -> RigSource:
+        """What drives one of them; the lift grows to its height during the first ``rise`` [s]."""
+        return RigSource(cam_road(self.lift, self.frequency, rise), held_link(self.angle))
 
 
 class _Stretch(NamedTuple):
@@ -122,10 +123,12 @@ class _Stretch(NamedTuple):
     def statuses(self) -> list[Status]:
         """How each dwell ended."""
         finite = np.isfinite(self.end).all(axis=1) & np.isfinite(self.readings).all(axis=(1, 2))
-        return [
-            Status.MAX_ITERATIONS if stopped else Status.CONVERGED if ok else Status.NOT_FINITE
-            for stopped, ok in zip(self.stopped, self.ok & finite, strict=True)
-        ]
+        return [_ended(*each) for each in zip(self.stopped, self.ok & finite, strict=True)]
+
+
+def _ended(stopped: bool, well: bool) -> Status:
+    """How an integration ended that took too many steps, or did not and gave numbers that are right."""
+    return Status.MAX_ITERATIONS if stopped else Status.CONVERGED if well else Status.NOT_FINITE
 
 
 def steady_dwells(
@@ -137,24 +140,33 @@ def steady_dwells(
     controls its error.
     """
     mechanics, hertz = without_sensor_faults(model), np.array(frequencies)
-    lift, angle = nominal_test(during[0])
     stacked = {name: jnp.stack([jnp.asarray(each[name]) for each in during]) for name in during[0]}
+    lift, angle = np.array([nominal_test(each) for each in during]).T
     dwells = placed(_Dwells(stacked, jnp.asarray(hertz), jnp.asarray(lift), jnp.asarray(angle)))
-    rest = _at_rest(mechanics, during[0], placed(held_link(angle)))
-    state, rise = np.broadcast_to(np.asarray(rest), (hertz.size, rest.size)), STRETCH
+    rest = np.asarray(_all_at_rest(mechanics, dwells))
+    state, rise = rest, STRETCH
     settled, status = np.zeros(hertz.size, np.bool_), [Status.MAX_ITERATIONS] * hertz.size
     for _ in range(ceil(PATIENCE / STRETCH)):
         along = _stretch(mechanics, dwells, state, np.ceil(STRETCH * hertz), rise, step)
         ended = along.statuses()
-        closed = _apart(mechanics, state, along.end) < CLOSED
-        new = ~settled & (closed | ~np.array([each.ok for each in ended]))
+        failed = np.array([not each.ok for each in ended])
+        new = ~settled & (failed | (_apart(mechanics, state, along.end) < CLOSED))
         status = [there if now else known for there, now, known in zip(ended, new, status, strict=True)]
-        settled, state, rise = settled | new, along.end, 0.0
-        if settled.all() or not all(each.ok for each in ended):
+        # Those that are lost begin again: the others need not wait for steps that lead nowhere.
+        settled, state, rise = settled | new, np.where(failed[:, None], rest, along.end), 0.0
+        if settled.all():
             break
     kept = _stretch(mechanics, dwells, state, np.ones(hertz.size), rise, step)
     dwell = zip(frequencies, during, kept.readings, status, kept.statuses(), strict=True)
     return [Steady(f, _shown(model, p, f, truth), joint_status(how)) for f, p, truth, *how in dwell]
+
+
+@eqx.filter_jit
+def _all_at_rest(model: QuarterCar, dwells: _Dwells) -> Array:
+    def one(dwell: _Dwells) -> Array:
+        return _at_rest(model, dwell.p, held_link(dwell.angle))
+
+    return jax.vmap(one)(dwells)
 
 
 def _apart(model: QuarterCar, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -192,11 +204,10 @@ def _all_stepped(*args: Any) -> tuple[Array, ...]:
 def _step_all(
     model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array, inner: Array
 ) -> tuple[Array, ...]:
-    def one(p: Values, frequency: Array, start: Array, duration: Array, inner: Array) -> tuple[Array, Array]:
-        source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
-        return _stepped(model, p, start, source, duration / SAMPLES, inner, SAMPLES)
+    def one(dwell: _Dwells, start: Array, duration: Array, inner: Array) -> tuple[Array, Array]:
+        return _stepped(model, dwell.p, start, dwell.source(rise), duration / SAMPLES, inner, SAMPLES)
 
-    return jax.vmap(one)(dwells.p, dwells.frequency, start, duration, inner)
+    return jax.vmap(one)(dwells, start, duration, inner)
 
 
 # Compiled as a whole: what prepares an integration would take longer than the integration, step by step. It cannot be
@@ -205,23 +216,20 @@ def _step_all(
 def _all_integrated(
     model: QuarterCar, dwells: _Dwells, start: Array, duration: Array, rise: Array
 ) -> tuple[Array, ...]:
-    def one(p: Values, frequency: Array, start: Array, duration: Array) -> tuple[Array, ...]:
-        source = RigSource(cam_road(dwells.lift, frequency, rise), held_link(dwells.angle))
-        times = jnp.linspace(0.0, duration, SAMPLES + 1)
-        found = simulate_transient(model, p, source, times, unpack_state(model, start), PRECISION)
+    def one(dwell: _Dwells, start: Array, duration: Array) -> tuple[Array, ...]:
+        times, begin = jnp.linspace(0.0, duration, SAMPLES + 1), unpack_state(model, start)
+        found = simulate_transient(model, dwell.p, dwell.source(rise), times, begin, PRECISION)
         ends = (RESULTS.max_steps_reached, RESULTS.successful)
         how = (jnp.asarray(found.result == each) for each in ends)
         return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], *how
 
-    return jax.vmap(one)(dwells.p, dwells.frequency, start, duration)
+    return jax.vmap(one)(dwells, start, duration)
 
 
 def _status_of(found: RESULTS, *numbers: Array) -> Status:
     """How an integration of controlled error ended that gave these numbers."""
-    if bool(found == RESULTS.max_steps_reached):
-        return Status.MAX_ITERATIONS
-    ended = bool(found == RESULTS.successful) and all(bool(jnp.isfinite(each).all()) for each in numbers)
-    return Status.CONVERGED if ended else Status.NOT_FINITE
+    finite = all(bool(jnp.isfinite(each).all()) for each in numbers)
+    return _ended(bool(found == RESULTS.max_steps_reached), bool(found == RESULTS.successful) and finite)
 
 
 @eqx.filter_jit
@@ -305,7 +313,7 @@ def integrate_fixed(
     interval, steps = placed((jnp.asarray(duration / samples), jnp.asarray(inner)))
     end, readings = _stepped(model, p, start, source, interval, steps, samples)
     finite = bool(jnp.isfinite(end).all() & jnp.isfinite(readings).all())
-    return end, readings, Status.CONVERGED if finite else Status.NOT_FINITE
+    return end, readings, _ended(stopped=False, well=finite)
 
 
 @eqx.filter_jit

@@ -88,11 +88,40 @@ def test_other_objects_are_not_waited_for() -> None:
     assert side_by_side(lambda: one.number, lambda: other.number) == (1, 1)
 
 
-def test_what_computing_raises_is_raised_and_computed_anew_when_asked_again() -> None:
-    asked = _Asked(threading.Barrier(2))
-    assert asked.work is not None
-    asked.work.abort()
-    with pytest.raises(threading.BrokenBarrierError):
-        _ = asked.number
-    asked.work = None
-    assert asked.number == 2
+def test_what_computing_raises_is_raised_and_those_who_waited_compute_one_at_a_time() -> None:
+    class Hard:
+        at_work, most, times = 0, 0, 0
+
+        @computed_once
+        def number(self) -> int:
+            """Fails the first time."""
+            self.at_work += 1
+            self.most = max(self.most, self.at_work)
+            self.times += 1
+            fails = self.times == 1
+            time.sleep(0.03)
+            self.at_work -= 1
+            if fails:
+                raise ValueError("no number")
+            return self.times
+
+    def ask(hard: Hard) -> int | None:
+        try:
+            return hard.number
+        except ValueError:
+            return None
+
+    hard = Hard()
+    assert sorted(in_parallel(ask, [hard] * 6), key=str) == [2] * 5 + [None]
+    assert hard.most == 1
+
+
+def test_a_property_that_asks_itself_ends() -> None:
+    class Circular:
+        @computed_once
+        def number(self) -> int:
+            """Itself."""
+            return self.number
+
+    with pytest.raises(RecursionError):
+        _ = Circular().number

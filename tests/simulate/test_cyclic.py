@@ -1,7 +1,6 @@
 """Recurrences that close after one period, against one dense solve of everything."""
 
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,10 +14,12 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate import collocation
-from savgs_ident.simulate.collocation import Steps
+from savgs_ident.simulate.collocation import Changes, Steps
 from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.mesh import CHUNK, Layout
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
+
+from .drawn_steps import Drawn, draw
 
 LAYOUTS = (
     Layout((CHUNK,)),
@@ -32,8 +33,8 @@ LAYOUTS = (
 
 
 @partial(jax.jit, static_argnums=0)
-def _solve(layout: Layout, steps: Steps, weight: Array, right: Array) -> Array:
-    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, weight), right).x
+def _solve(layout: Layout, steps: Steps, weight: Array, right: Array) -> Changes:
+    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, weight), right)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -45,7 +46,7 @@ def _solve_many(layout: Layout, steps: Steps, weight: Array, rights: Array) -> A
 _invert_nodes = jax.jit(collocation.invert_nodes)
 
 
-def _dense(layout: Layout, drawn: "_Drawn") -> NDArray[np.float64]:
+def _dense(layout: Layout, drawn: Drawn) -> NDArray[np.float64]:
     """All dx_n at once from A_{n+1} dx_{n+1} - B_n dx_n = d_n, the indices worked out here by hand.
 
     What begins with a given state has A_0 dx_0 = 0.
@@ -66,43 +67,6 @@ def _dense(layout: Layout, drawn: "_Drawn") -> NDArray[np.float64]:
     return flat.reshape(total, size).T
 
 
-class _Drawn(NamedTuple):
-    """Steps, the weights of their far ends, right sides, and A_n and B_n put together entry by entry, (P, m, m)."""
-
-    steps: Steps
-    weight: np.ndarray
-    right: np.ndarray
-    far: np.ndarray
-    near: np.ndarray
-
-    @property
-    def given(self) -> tuple[Steps, np.ndarray, np.ndarray]:
-        return self.steps, self.weight, self.right
-
-
-def _draw(seed: int, layout: Layout, places: int, states: int, decay: float) -> _Drawn:
-    """Steps of oscillators that are coupled and damped, some states slipping, and right sides of unlike sizes.
-
-    Everything decays by about ``decay`` in a node.
-    """
-    rng = np.random.default_rng(seed)
-    rows, size, total = places + states, 2 * places + states, layout.total
-    drawn = rng.standard_normal((total, rows, rows))
-    damping = decay * (np.eye(rows) + 0.2 * drawn / np.linalg.norm(drawn, 2, axis=(1, 2), keepdims=True))
-    flow = np.zeros((total, size, size))
-    flow[:, places:, places:] = -damping
-    flow[:, np.arange(places), places + np.arange(places)] = 1.0
-    flow[:, places : 2 * places, :places] = -rng.uniform(0.1, 0.4, (total, 1, 1)) * np.eye(places)
-    weight = np.concatenate([np.full(2 * places, 0.5), rng.choice([0.5, 1.0], states)])[:, None]
-    after = rng.uniform(0.5, 2.0, total)
-    before, eye = after[layout.preceding], np.eye(size)
-    far = eye - before[:, None, None] * weight * flow
-    near = eye + after[:, None, None] * (1.0 - weight) * flow
-    lower = np.moveaxis(np.linalg.inv(far)[:, places:], 0, -1)
-    right = rng.standard_normal((size, total)) * 10.0 ** rng.uniform(-3.0, 3.0, (size, 1))
-    return _Drawn(Steps(lower, before, after / before), weight, right, far, near)
-
-
 @given(
     seed=st.integers(0, 2**32 - 1),
     layout=st.sampled_from(LAYOUTS),
@@ -110,10 +74,20 @@ def _draw(seed: int, layout: Layout, places: int, states: int, decay: float) -> 
     decay=st.floats(0.05, 1.0),
 )
 def test_it_solves_the_whole_cycle(seed: int, layout: Layout, kind: tuple[int, int], decay: float) -> None:
-    drawn = _draw(seed, layout, *kind, decay)
-    wanted = _dense(layout, drawn)
-    found = np.asarray(_solve(layout, *drawn.given))
-    assert found == pytest.approx(wanted, rel=1e-8, abs=1e-9 * np.max(np.abs(wanted)))
+    drawn = draw(seed, layout, *kind, decay)
+    wanted, places = _dense(layout, drawn), kind[0]
+    found, rate = (np.asarray(each) for each in _solve(layout, *drawn.given))
+    size = np.max(np.abs(wanted))
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-10 * size)
+    assert rate == pytest.approx(np.einsum("pij,jp->ip", drawn.flow[:, places:], wanted), abs=1e-9 * size)
+
+
+@pytest.mark.parametrize("kind", [(1, 0), (2, 1), (1, 2)])
+def test_what_a_step_divides_by_is_undone(kind: tuple[int, int]) -> None:
+    drawn = draw(7, LAYOUTS[2], *kind, 0.3)
+    wanted = np.einsum("pij,jp->ip", drawn.far, drawn.right)
+    found = np.asarray(collocation.undone(drawn.steps, drawn.weight, drawn.right))
+    assert found == pytest.approx(wanted, rel=1e-10, abs=1e-11 * np.max(np.abs(wanted)))
 
 
 def test_growing_directions_are_solved_too_if_the_period_closes() -> None:
@@ -126,11 +100,12 @@ def test_growing_directions_are_solved_too_if_the_period_closes() -> None:
     steps = Steps(np.linalg.inv(far)[:, :, None] * ones, ones, ones)
     right = np.random.default_rng(1).standard_normal((2, layout.total))
     same = (layout.total, 1, 1)
-    drawn = _Drawn(steps, np.full((2, 1), 0.5), right, np.tile(far, same), np.tile(near, same))
+    whole = (np.tile(each, same) for each in (far, near, flow))
+    drawn = Drawn(steps, np.full((2, 1), 0.5), right, *whole)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     found = np.asarray(collocation.step_matrices(steps, drawn.weight))
     assert found == pytest.approx(turn[:, :, None] * ones, abs=1e-14)
-    assert np.asarray(_solve(layout, *drawn.given)) == pytest.approx(
+    assert np.asarray(_solve(layout, *drawn.given).x) == pytest.approx(
         _dense(layout, drawn), rel=1e-10, abs=1e-11
     )
 
@@ -138,7 +113,7 @@ def test_growing_directions_are_solved_too_if_the_period_closes() -> None:
 def test_one_factorisation_serves_many_right_sides() -> None:
     layout = LAYOUTS[2]
     drawn, other = (
-        _draw(3, layout, 2, 1, 0.1)._replace(right=_draw(s, layout, 2, 1, 0.1).right) for s in (3, 4)
+        draw(3, layout, 2, 1, 0.1)._replace(right=draw(s, layout, 2, 1, 0.1).right) for s in (3, 4)
     )
     first, second = drawn.right, other.right
     rights = np.stack([first, second, 2.0 * first - 3.0 * second, np.zeros_like(first)])
@@ -150,12 +125,12 @@ def test_one_factorisation_serves_many_right_sides() -> None:
 @pytest.mark.slow
 def test_dwells_do_not_see_each_other() -> None:
     layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK))
-    drawn = _draw(5, layout, 1, 2, 0.05)
-    whole = np.asarray(_solve(layout, *drawn.given))
+    drawn = draw(5, layout, 1, 2, 0.05)
+    whole = np.asarray(_solve(layout, *drawn.given).x)
     for dwell, count in enumerate(layout.counts):
         mine = layout.dwell == dwell
         steps = Steps(*(each[..., mine] for each in drawn.steps))
-        single = np.asarray(_solve(Layout((count,)), steps, drawn.weight, drawn.right[:, mine]))
+        single = np.asarray(_solve(Layout((count,)), steps, drawn.weight, drawn.right[:, mine]).x)
         np.testing.assert_allclose(whole[:, mine], single, rtol=1e-13, atol=1e-12)
 
 

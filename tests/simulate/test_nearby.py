@@ -19,6 +19,7 @@ from savgs_ident.simulate.mesh import CHUNK, Layout
 from savgs_ident.simulate.nearby import solve_near, worst_dwells
 from savgs_ident.simulate.periodic import PeriodicSolution, resolve
 
+from .drawn_steps import draw
 from .programme import altered
 
 LAYOUTS = (
@@ -57,34 +58,27 @@ def test_a_part_holds_the_worst_dwells_whole(
 
 
 @partial(jax.jit, static_argnums=0)
-def _whole(layout: Layout, steps: Steps, right: Array) -> Array:
-    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, HALVES), right).x
+def _whole(layout: Layout, steps: Steps, weight: Array, right: Array) -> Array:
+    return collocation.solve_steps(layout, collocation.factorise_steps(layout, steps, weight), right).x
 
 
 @partial(jax.jit, static_argnums=0)
-def _in_part(layout: Layout, left: Array, steps: Steps, right: Array) -> tuple[Array, Array]:
+def _in_part(layout: Layout, left: Array, steps: Steps, weight: Array, right: Array) -> tuple[Array, Array]:
     part = worst_dwells(layout, left, 0.0, 4)
     some = Steps(*(each[..., part.nodes] for each in steps))
-    factors = collocation.factorise_steps(part, some, HALVES)
+    factors = collocation.factorise_steps(part, some, weight)
     return part.write_to, collocation.solve_steps(part, factors, right[:, part.nodes]).x
-
-
-HALVES = np.full((3, 1), 0.5)
-"""Weights of three states of which none slips."""
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("worst", range(4))
 def test_a_part_is_solved_like_the_whole(layout: Layout, worst: int) -> None:
-    random = np.random.default_rng(worst)
-    lower = 0.9 * np.eye(3)[:, :, None] + 0.1 * random.standard_normal((3, 3, layout.total))
-    steps = Steps(lower, np.ones(layout.total), np.ones(layout.total))
-    right = random.standard_normal((3, layout.total))
+    drawn = draw(worst, layout, 1, 2, 0.1)
     left = np.roll([4.0, 3.0, 2.0, 1.0], worst)
-    kept, found = (np.asarray(each) for each in _in_part(layout, jnp.asarray(left), steps, right))
+    kept, found = (np.asarray(each) for each in _in_part(layout, jnp.asarray(left), *drawn.given))
     needed = kept < layout.total
     assert needed.sum() >= CHUNK
-    expected = np.asarray(_whole(layout, steps, right))[:, kept[needed]]
+    expected = np.asarray(_whole(layout, *drawn.given))[:, kept[needed]]
     np.testing.assert_allclose(found[:, needed], expected, rtol=1e-9, atol=1e-9)
 
 
