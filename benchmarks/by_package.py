@@ -17,7 +17,7 @@ CHANGE = 1.01
 
 
 def measure(task: Task, reference: Harmonics) -> Outcome:
-    """Cold start, warm start, and both with the gradient."""
+    """Cold start, warm start, and the warm start with the gradient, whose time is added to the cold one, too."""
     excitation, dwells = task.excitation, task.frequency.size
     moved = task.values | {name: CHANGE * task.values[name] for name in PARAMETERS}
 

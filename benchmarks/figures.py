@@ -112,6 +112,11 @@ FIGURES: dict[str, Figure] = {
     ),
     "diagnose_cached_s": Figure("s", ".1f", "The same again, with the compiled programs on disk."),
     "diagnose_peak_mb": Figure("MB", ".0f", "Most memory that either took."),
+    "diagnose_other_cold_s": Figure(
+        "s", ".1f", "The same without friction of the rail, which the catalogue is not told of, first time."
+    ),
+    "diagnose_other_cached_s": Figure("s", ".1f", "The same again, with the compiled programs on disk."),
+    "diagnose_other_peak_mb": Figure("MB", ".0f", "Most memory that either took."),
     "trials_effects": Figure("", ".0f", "Blind trials with one effect of the catalogue."),
     "trials_nothing": Figure("", ".0f", "Blind trials with nothing missing."),
     "top1_percent_ours": Figure("%", ".0f", "Effects that the diagnosis names first and by their own name."),
