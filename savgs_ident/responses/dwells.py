@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, Recording
@@ -62,7 +63,13 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") ->
     """
     if orders < 1:
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
-    driven, recorded = driven or campaign.layout.driven, campaign
+    # Beside other programs threads of the linear algebra wait for each other: it takes up to five times as long.
+    with threadpool_limits(1, "blas"):
+        return _estimated(campaign, orders, driven or campaign.layout.driven)
+
+
+def _estimated(campaign: Campaign, orders: int, driven: str) -> HarmonicResponse:
+    recorded = campaign
     campaign = campaign.only({*campaign.names} - {*campaign.layout.free})
     fits, groups, warnings = _fit_all(campaign, orders, {}, driven)
     if not fits:
