@@ -16,7 +16,7 @@ only:
 
     a_{n+1} = M_n a_n + d_n,    a_N = a_0.
 
-M_n is never formed (:func:`_one_step`). A_n and B_n are the same but for the time step, so that dx_n, which is wanted
+M_n is never formed (``_one_step``). A_n and B_n are the same but for the time step, so that dx_n, which is wanted
 anyway, gives M_n a_n = dx_n + r_n (dx_n - a_n) with r_n = h_n (1 - g) / (h_{n-1} g); and the rate of a coordinate is
 a speed, so that of A_n^-1 only the k rows of speeds and internal states are multiplied. The recurrence is solved
 dwell by dwell (:func:`factorise_steps`, :func:`solve_steps`). Eliminating from node to node is stable because a rig

@@ -7,7 +7,7 @@ dynamics, which are linear, act on its harmonics. All dwells are integrated side
 one after the other they take three to five times as long.
 
 The integration controls its error, or has a fixed step: the truth of foreign trials is integrated by the classical
-method of Runge and Kutta (:func:`_stepped`), the accelerations at every stage being the root of the plant's
+method of Runge and Kutta (``_stepped``), the accelerations at every stage being the root of the plant's
 residual. So it shares no method with the diagnosis nor with other virtual campaigns.
 
 Source: Kutta 1901, Zeitschrift fuer Mathematik und Physik 46.
